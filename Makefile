@@ -11,10 +11,10 @@ JOBS ?= auto
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
-CXX_SOURCES := $(shell find core bindings browser include tests examples benchmarks -name '*.[ch]pp' -o -name '*.[ch]')
+CXX_SOURCES := $(shell find core bindings browser include tests examples workshop -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
-        collection-wheel campaigns deb release clean help
+        collection-wheel results-wheel campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -36,6 +36,7 @@ help:
 	@echo "make wheel   a wheel of it with HDF5 and METIS inside, installed and tried (HDF5_SOURCE=FOLDER,"
 	@echo "             METIS_SOURCE=FOLDER: their sources, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
+	@echo "make results-wheel     the published runs, as a wheel, into dist/results"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make campaigns  run the published campaigns, BUDGET=10min each, and pack stores and tables"
 	@echo "make deb     the C library as Debian packages, into dist/"
@@ -89,18 +90,18 @@ build-cost: setup
 	$(BIN)/python scripts/build_cost.py
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
-	$(BIN)/ruff check python tests benchmarks examples scripts
-	$(BIN)/ruff format --check python tests benchmarks examples scripts
+	$(BIN)/ruff check python tests workshop examples scripts
+	$(BIN)/ruff format --check python tests workshop examples scripts
 	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
 	$(BIN)/mypy --package fclib
 	@# for the oldest Python; what NumPy's types say there differs
 	$(BIN)/mypy --python-version 3.10 --disable-error-code no-any-return --package fclib
-	$(BIN)/mypy tests benchmarks examples/python scripts/*.py
+	$(BIN)/mypy tests workshop examples/python scripts/*.py
 	$(BIN)/mypy scripts/site
 
 format: $(VENV)/.lint-tools
-	$(BIN)/ruff check --fix python tests benchmarks examples scripts
-	$(BIN)/ruff format python tests benchmarks examples scripts
+	$(BIN)/ruff check --fix python tests workshop examples scripts
+	$(BIN)/ruff format python tests workshop examples scripts
 	$(BIN)/clang-format -i $(CXX_SOURCES)
 
 tidy: setup $(VENV)/.lint-tools
@@ -130,7 +131,7 @@ wheels: sdist
 # tried as it is installed: every stored trajectory is found in it and read
 campaigns: setup
 	set -e; for name in $(CAMPAIGNS); do \
-	  $(BIN)/python benchmarks/published_campaigns.py $$name --budget $(BUDGET); done
+	  $(BIN)/python -m workshop.tables.campaign $$name --budget $(BUDGET); done
 	mkdir -p dist
 	tar -czf dist/fclib-campaigns.tar.gz -C $(BUILD) campaigns -C .. docs/results
 	@echo dist/fclib-campaigns.tar.gz
@@ -139,6 +140,11 @@ collection-wheel: setup $(VENV)/.package-tools
 	rm -rf dist/collection
 	$(BIN)/python -m build --wheel --outdir dist/collection collection
 	$(BIN)/python scripts/check_collection.py dist/collection/*.whl
+
+results-wheel: setup $(VENV)/.package-tools
+	$(BIN)/fclib results verify --in results/fclib_results/runs
+	rm -rf dist/results
+	$(BIN)/python -m build --wheel --outdir dist/results results
 
 deb:
 	cmake -S . -B $(BUILD)/deb -G Ninja -DFCLIB_PYTHON=OFF -DCMAKE_INSTALL_PREFIX=/usr
@@ -154,7 +160,7 @@ release: $(VENV)/.package-tools
 	$(BIN)/python scripts/release.py check
 	rm -rf dist
 	$(MAKE) lint test docs
-	$(MAKE) wheels collection-wheel deb
+	$(MAKE) wheels collection-wheel results-wheel deb
 	$(BIN)/python scripts/release.py finish dist
 
 clean:

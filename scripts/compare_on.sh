@@ -5,7 +5,7 @@
 #   sh scripts/compare_on.sh SUITE [SET...]      SUITE is trixie, ...; the sets are tiny and standard by default
 #
 # The chroot is that of scripts/try_on.sh, what is compared is what is committed, and how is told on top of
-# benchmarks/apart.py.
+# workshop/sets/apart.py.
 set -eu
 [ $# -ge 1 ] || { sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 suite=$1
@@ -19,4 +19,4 @@ build=".venv/bin/fclib collection build $* --no-references --no-pictures --form 
 sh "$source/scripts/try_on.sh" "$suite" sh -c "make setup && $build --out built"
 cd "$source"
 $build --out "$here" >/dev/null
-.venv/bin/python benchmarks/apart.py "$here" "$chroot/fclib/built"
+.venv/bin/python -m workshop.sets.apart "$here" "$chroot/fclib/built"

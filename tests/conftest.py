@@ -12,6 +12,7 @@ import pytest
 
 TESTS = Path(__file__).parent
 sys.path.insert(0, str(TESTS))  # for helpers.py, which --import-mode=importlib does not find
+sys.path.append(str(TESTS.parent))  # for workshop, which is not installed
 
 import rebuild  # noqa: E402
 

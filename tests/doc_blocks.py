@@ -58,7 +58,9 @@ def pages() -> list[Path]:
     """The pages whose blocks are tested one by one."""
     tops = ["README.md", "ARCHITECTURE.md"]
     docs = sorted((ROOT / "docs").glob("*.md"))
-    return [*(ROOT / name for name in tops), *(page for page in docs if page not in tutorials())]
+    notes = sorted((ROOT / "workshop").rglob("*.md"))
+    own = [page for page in docs if page not in tutorials()]
+    return [*(ROOT / name for name in tops), *own, *notes]
 
 
 def tutorials() -> list[Path]:

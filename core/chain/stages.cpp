@@ -20,7 +20,7 @@ namespace fclib::chain {
 
 namespace {
 
-// What no table sets. benchmarks/constants.py tries other values of some.
+// What no table sets. workshop/tuning/constants.py tries other values of some.
 
 // Operations: of a sweep, for each contact, besides one for each entry of W; and of a factorisation
 // with its solve and the rest of an iteration, over its multiplications.

@@ -43,7 +43,7 @@ std::vector<Index> minimum_degree(const BlockPattern& pattern) {
 }
 
 /// A factorisation with at least so many multiplications tries another ordering, which costs once
-/// some tenths of them. benchmarks/factorisation.py tried packings and walls of 90 to 9,704
+/// some tenths of them. workshop/tables/factorisation.py tried packings and walls of 90 to 9,704
 /// contacts: for smaller factorisations nothing is gained.
 constexpr double worth_dissection = 1e8;
 

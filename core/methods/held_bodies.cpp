@@ -13,7 +13,7 @@ namespace fclib {
 
 namespace {
 
-// benchmarks/constants.py tries other values of these
+// workshop/tuning/constants.py tries other values of these
 constexpr int round_patience = 5;  // rounds in which the error must get better
 constexpr double better = 0.5;     // share of the least error below which it got better
 constexpr double most_moving =

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._meant import meant
+from fclib._meant import nearest
 
 GROUP = "fclib.solvers"
 SolverError = _core.SolverError
@@ -286,5 +286,6 @@ def find_solver(name: str) -> _core.SolverInfo:
         return _registered[name]
     known = [info.name for info in solvers()]
     raise _core.OptionError(
-        f"solver '{name}': unknown; {meant(name, known)}there is: {', '.join(known)}"
+        f"solver '{name}': unknown; the nearest are {nearest(name, known)};"
+        " `fclib solvers` lists all"
     )

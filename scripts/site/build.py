@@ -56,7 +56,7 @@ MENU = {
         "recorders",
     ],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
-    "The bench": ["bench", "measurement", "report"],
+    "The bench": ["bench", "measurement", "published-runs", "report"],
     "Interfaces": [
         "command-line",
         "python",

@@ -16,7 +16,11 @@ import re
 from functools import cache
 from pathlib import Path
 
-TABLE = re.compile(r'^\[Table: ([^\]]+)\]\(results/([\w-]+)\.csv(?: "([^"]*)")?\)$', re.MULTILINE)
+# pages outside of docs/ name the way to it
+TABLE = re.compile(
+    r'^\[Table: ([^\]]+)\]\((?:\.\./\.\./docs/)?results/([\w-]+)\.csv(?: "([^"]*)")?\)$',
+    re.MULTILINE,
+)
 ENTRY = re.compile(r"(?<!`)\{\{([\w-]+): *([^,{}]+), *([^{}]+?) *\}\}")
 # columns of these are put to the right
 NUMBER = re.compile(r"[-+]?[\d.,]*(?:e[-+]?\d+)?(?: ?%)?")
@@ -34,7 +38,7 @@ class Results:
         path = self.folder / f"{name}.csv"
         if not path.is_file():
             raise ValueError(
-                f"{path}: no such table; a script of benchmarks/ makes it (--results {name})"
+                f"{path}: no such table; a script of workshop/ makes it (--results {name})"
             )
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))

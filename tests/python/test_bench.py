@@ -845,7 +845,7 @@ def test_one_form_of_a_problem_is_run(
     [
         ({"solvers": []}, "no list of solvers"),
         ({"solvers": "auto"}, "no list of solvers"),
-        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss.*did you mean nsgs"),
+        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss.*nearest are nsgs, "),
         ({"solvers": [{"name": "nsgs", "options": "relaxation=1"}]}, r"\.options: is no table"),
         ({"solvers": ["nsgs relaxation=-1"]}, "relaxation"),
         ({"solvers": ["nsgs", "nsgs"]}, "two that are called 'nsgs'"),

@@ -634,7 +634,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def prepare(folder: Path) -> Path:
-    """Put the solvers and a problem into a folder; benchmarks/bench_trials.py does so, too."""
+    """Put the solvers and a problem into a folder; workshop/tables/bench_trials.py does so, too."""
     planted = planted_local(3, nc=5)
     titled = planted.problem.replace(info=fclib.ProblemInfo(title="Planted"))
     fclib.write(folder / "problem.hdf5", titled)

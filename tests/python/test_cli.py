@@ -259,6 +259,43 @@ def test_check_finds_the_wrong_one(files: list[Path]) -> None:
     assert run("check", "--tol", "1e-3", *files).returncode == 0
 
 
+def test_check_prints_its_tolerance(files: list[Path]) -> None:
+    assert "the tolerance is 1e-08 (--tol)" in run("check", files[0]).stdout
+    assert "the tolerance is 0.001 (--tol)" in run("check", files[0], "--tol", "1e-3").stdout
+    assert "tolerance" not in run("check", files[0], "--json").stdout
+
+
+def test_solve_takes_a_solver_with_its_options(files: list[Path]) -> None:
+    (said,) = records(run("solve", "--json", "--solver", "nsgs relaxation=1.2", files[0]))
+    assert said["solver"] == "nsgs relaxation=1.2"
+    both = ("--solver", "nsgs relaxation=1.2", "--option", "relaxation=0.9")
+    (said,) = records(run("solve", "--json", *both, files[0]))
+    assert said["solver"] == "nsgs relaxation=0.9"
+    for text, word in (
+        ("nsgss", "the nearest are nsgs, "),
+        ("nsgs relaxation", "not of the form name=value"),
+        ("nsgs relaxatio=1", "relaxatio"),
+        ("", "unknown"),
+    ):
+        done = run("solve", "--solver", text, files[0])
+        assert done.returncode == 2
+        assert word in done.stderr
+
+
+def test_solve_says_what_to_do_next(tmp_path: Path, files: list[Path]) -> None:
+    """A line for each status, not for each file; none after success."""
+    done = run("solve", "--solver", "associated", *files)
+    assert done.stdout.count("inaccurate") > 1
+    assert done.stderr.count("try --solver auto") == 1
+    none = fclib.LocalProblem(
+        spacedim=2, W=np.zeros((2, 2)), q=np.array([-1.0, 0.0]), mu=np.array([0.5])
+    )
+    fclib.write(tmp_path / "none.hdf5", none)
+    done = run("solve", tmp_path / "none.hdf5")
+    assert "infeasible: there is no solution" in done.stderr
+    assert run("solve", files[0]).stderr == ""
+
+
 def test_check_without_a_solution_fails(tmp_path: Path) -> None:
     path = tmp_path / "unsolved.hdf5"
     fclib.write(path, planted_local(1).problem)

@@ -205,9 +205,11 @@ def look_up_other(line: str, root: Path) -> None:
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (root / "Makefile").read_text(), re.MULTILINE), line
     elif words[0] in (".venv/bin/python", "python"):
+        if words[1] == "-m":
+            words[1:3] = [f"{words[2].replace('.', '/')}.py"]
         script = (root / words[1]).read_text()
         if "_results.add_option(" in script:
-            script += (root / "benchmarks/_results.py").read_text()
+            script += (root / "workshop/tables/_results.py").read_text()
         for word in words[2:]:
             assert not word.startswith("--") or f'"{word}"' in script, f"{line}: no option {word}"
     elif words[:2] == ["pip", "install"]:

@@ -640,9 +640,11 @@ def test_siconos_solves_the_same_problem(tmp_path: Path, kind: str) -> None:
 
 def test_problems_of_scenes_that_siconos_simulates(tmp_path: Path) -> None:
     siconos("print(1)", needs="siconos.mechanics.collision.bullet, scipy, h5py")
-    benchmark = Path(__file__).parents[2] / "benchmarks" / "siconos_scenes.py"
-    command: list[str | Path] = [sys.executable, benchmark, tmp_path, "--scenes", "towers-4-0.4"]
-    subprocess.run([*command, "--steps", "41", "--every", "20"], check=True, capture_output=True)
+    root = Path(__file__).parents[2]
+    command: list[str | Path] = [sys.executable, "-m", "workshop.sets.siconos_scenes", tmp_path]
+    command += ["--scenes", "towers-4-0.4"]
+    counts = ["--steps", "41", "--every", "20"]
+    subprocess.run([*command, *counts], check=True, capture_output=True, cwd=root)
     files = sorted(tmp_path.glob("towers-4-0.4-*.hdf5"))
     assert len(files) == 2
     for path in files:
@@ -652,6 +654,6 @@ def test_problems_of_scenes_that_siconos_simulates(tmp_path: Path) -> None:
         w = dense(problem.W)
         assert np.linalg.eigvalsh(w + w.T).min() > -1e-12 * np.abs(w).max()
         assert fclib.solve(problem).converged
-    wrong = subprocess.run([*command[:-1], "towers"], capture_output=True, text=True)
+    wrong = subprocess.run([*command[:-1], "towers"], capture_output=True, text=True, cwd=root)
     assert wrong.returncode == 2
     assert "KIND-BODIES-MU" in wrong.stderr

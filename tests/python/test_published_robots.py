@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,8 +13,9 @@ pytest.importorskip("mujoco", reason="simulates")
 
 from fclib.scenes import Scene
 from fclib.simulate import simulate
+from workshop.sets import published_robots
 
-STEPS = 10  # of each published model: benchmarks/published_robots.py makes 100
+STEPS = 10  # of each published model: workshop/sets/published_robots.py makes 100
 MODELS = 12  # of each package, evenly spread over its files
 
 # a trunk with three legs, each with its hip and its knee at a limit, high above the floor
@@ -48,22 +46,6 @@ LEG = """
 """
 
 
-def published() -> Any:
-    """The benchmark, which finds and simulates published models."""
-    path = Path(__file__).parents[2] / "benchmarks" / "published_robots.py"
-    spec = importlib.util.spec_from_file_location("published_robots", path)
-    assert spec is not None
-    assert spec.loader is not None
-    # scripts of benchmarks/ import what stands beside them
-    folder = str(path.parent)
-    if folder not in sys.path:
-        sys.path.append(folder)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 def in_flight(velocity: str, hip: float = 0.0) -> Scene:
     """The robot, joints at their limits, moving as a whole but for its first hip [rad/s]."""
     legs = "".join(LEG.format(x=x) for x in (-0.15, 0.0, 0.15))
@@ -75,13 +57,12 @@ def in_flight(velocity: str, hip: float = 0.0) -> Scene:
 def test_a_robot_in_free_flight_with_joints_at_their_limits_needs_no_reaction(
     velocity: str,
 ) -> None:
-    robots = published()
     seen = 0
     for step in simulate(in_flight(velocity), 40):
         problem: Any = step.problem
         if not problem.nc:
             continue
-        q, rounding = robots.free_velocity(problem)
+        q, rounding = published_robots.free_velocity(problem)
         assert q <= rounding <= 1e-10
         result = fclib.solve(problem)
         assert result.status == "converged", (step.index, result.error, q, rounding)
@@ -103,9 +84,8 @@ def test_what_moves_a_joint_against_its_limit_in_flight_is_no_rounding() -> None
 
 @pytest.mark.slow
 def test_robots_of_installed_packages_are_solved() -> None:
-    robots = published()
     by_package: dict[str, list[Any]] = {}
-    for robot in robots.robots():
+    for robot in published_robots.robots():
         by_package.setdefault(robot.package, []).append(robot)
     if not by_package:
         pytest.skip("no installed package ships MJCF files")
@@ -114,12 +94,12 @@ def test_robots_of_installed_packages_are_solved() -> None:
     for found in by_package.values():
         for robot in found[:: max(1, len(found) // MODELS)]:
             try:
-                for problem in robots.problems(robot.path, STEPS):
+                for problem in published_robots.problems(robot.path, STEPS):
                     result = fclib.solve(problem)
                     solved += result.converged
                     if result.converged or result.status == "infeasible":
                         continue
-                    q, rounding = robots.free_velocity(problem)
+                    q, rounding = published_robots.free_velocity(problem)
                     left.append(f"{robot.package} {robot.name}: {result.status}, {q}, {rounding}")
                     # what is rounding is solved by no reaction
                     assert q > rounding, left[-1]

@@ -836,6 +836,24 @@ def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
         assert fclib.solve(problem).converged
 
 
+@pytest.mark.parametrize("scheme", [GLOBAL, LOCAL])
+def test_siconos_bodies_that_touch_nothing_fall(scheme: tuple[str, str], tmp_path: Path) -> None:
+    """Balls above the ground: they fall while it is recorded, as they do while it is not."""
+    needs_siconos()
+    script = tmp_path / "falling.py"
+    script.write_text(SICONOS.replace("[1.01 * i, 0, 0.5]", "[2 * i, 0, 0.52]"), encoding="utf-8")
+    recording = recorders.Recording(tmp_path / "out")
+    recorders.ENGINES["siconos"](recording, script, (*scheme, "20"))
+    assert recording.seen == 20
+    first = min(int(file.stem[-6:]) for file in (tmp_path / "out").glob("*.hdf5"))
+    # it takes sqrt(2 gap / g) = 64 ms, and Bullet sees the ground a little before
+    assert 5 <= first <= 13
+    problem: Any = fclib.read(tmp_path / "out" / f"siconos-{first:06d}.hdf5")
+    local = problem.condense() if problem.kind == "global" else problem
+    # at the end of the step, without reactions; theta = 0.5
+    assert local.q[0] == pytest.approx(-9.80665 * 0.005 * (first + 1), rel=1e-9)
+
+
 def test_a_script_of_siconos_that_fails_keeps_its_steps(tmp_path: Path) -> None:
     needs_siconos()
     script = tmp_path / "balls.py"
@@ -872,3 +890,111 @@ def test_an_engine_that_is_missing_is_named(
     assert done.exit_code == 1
     said = " ".join(done.output.split())
     assert "pybullet is not installed; install it with: pip install 'fclib[recorders]'" in said
+
+
+# ---- MuJoCo's own steps
+
+ARM = """
+<mujoco>
+  <option integrator="{integrator}" cone="{cone}" timestep="0.002" jacobian="{jacobian}"/>
+  <worldbody>
+    <geom type="plane" size="1 1 1" condim="{condim}"/>
+    <body name="box" pos="0 0 .12" euler="20 30 0">
+      <freejoint/>
+      <geom type="box" size=".1 .1 .1" condim="{condim}" margin=".01"/>
+    </body>
+    <body name="arm" pos="1 0 .1">
+      <joint name="a" type="hinge" axis="0 1 0" damping=".5" frictionloss=".2" range="-1 20"/>
+      <geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/>
+      <body pos=".3 0 0">
+        <joint name="b" type="hinge" axis="0 1 0" damping=".1" stiffness="2"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 .2 0 0"/>
+      </body>
+    </body>
+  </worldbody>
+  <equality><joint joint1="a" joint2="b" polycoef="0 .5 0 0 0"/></equality>
+  <actuator><position joint="b" kp="20" kv="1"/></actuator>
+</mujoco>
+"""
+
+
+def arm(**changes: Any) -> tuple[Any, Any]:
+    """A box thrown on a plane, and an arm with all that a model may have."""
+    mujoco = pytest.importorskip("mujoco")
+    usual = {"integrator": "Euler", "cone": "elliptic", "jacobian": "dense", "condim": 3}
+    model = mujoco.MjModel.from_xml_string(ARM.format(**usual | changes))
+    data = mujoco.MjData(model)
+    data.qvel[:6] = 0.5, 0.2, 0, 3, 0, 1
+    data.ctrl[:] = 0.3
+    return model, data
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+@pytest.mark.parametrize("jacobian", ["dense", "sparse"])
+@pytest.mark.parametrize("condim", [1, 3, 4, 6])
+def test_mujocos_reaction_gives_its_next_velocity(
+    integrator: str, cone: str, jacobian: str, condim: int
+) -> None:
+    model, data = arm(integrator=integrator, cone=cone, jacobian=jacobian, condim=condim)
+    contacts = 0
+    for _ in range(200):
+        step = recorders.mujoco(model, data)
+        assert step.guess is not None
+        assert step.mismatch < 1e-12
+        contacts = max(contacts, len(step.contacts))  # type: ignore[arg-type]
+        r = step.guess.r.reshape(-1, 3)
+        assert (r[:, 0] >= 0).all()
+        if cone == "elliptic":  # the corners of a pyramid are outside of the cone
+            slack = step.problem.mu * r[:, 0] - np.hypot(r[:, 1], r[:, 2])
+            assert slack.min() > -1e-9 * np.abs(r).max()
+    assert contacts > 1
+    assert step.assembled.problem.p == 1
+    assert fclib.solve(step.problem).converged
+
+
+def test_mujocos_body_at_rest_is_near_coulombs_law() -> None:
+    """A box that lies: soft or not, its weight is carried, and the error says how soft."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'><freejoint/>"
+        "<geom type='box' size='.1 .1 .1' mass='2'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    for _ in range(1000):
+        step = recorders.mujoco(model, data)
+    assert step.guess is not None
+    assert step.guess.r[::3].sum() == pytest.approx(2 * 9.81 * 0.002, rel=1e-6)
+    assert fclib.merit(step.problem, step.guess).error < 1e-6
+    origin = json.loads(step.problem.info.description.splitlines()[-1])
+    assert (origin["engine"], origin["fields"]["w"]) == ("MuJoCo", "reconstructed")
+
+
+def test_a_script_of_mujoco_is_recorded(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    script = tmp_path / "drop.py"
+    script.write_text(
+        "import mujoco\nfrom mujoco import mj_step\n"
+        "model = mujoco.MjModel.from_xml_string(\n"
+        "    \"<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .099'>\"\n"
+        "    \"<freejoint/><geom type='sphere' size='.1'/></body></worldbody></mujoco>\")\n"
+        "data = mujoco.MjData(model)\n"
+        "mujoco.mj_step(model, data)\nmj_step(model, data, nstep=9)\nprint(data.time)\n"
+    )
+    before = mujoco.mj_step
+    done = CliRunner().invoke(
+        app, ["record", "mujoco", str(script), "--out", str(tmp_path / "out"), "--every", "5"]
+    )
+    assert done.exit_code == 0, done.output
+    assert "2 of 10 steps" in done.output
+    assert mujoco.mj_step is before
+    files = sorted((tmp_path / "out").glob("*.hdf5"))
+    assert [file.name for file in files] == ["mujoco-000000.hdf5", "mujoco-000005.hdf5"]
+    assert fclib.solve(fclib.read(files[0])).converged
+
+
+def test_what_is_not_recorded_of_mujoco_is_named() -> None:
+    model, data = arm(integrator="RK4")
+    with pytest.raises(ValueError, match="mjINT_RK4 is not recorded"):
+        recorders.mujoco(model, data)
+    assert data.time == 0

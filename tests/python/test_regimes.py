@@ -12,16 +12,14 @@ import fclib
 from fclib import collections
 from fclib.collections import published
 from fclib.scenes.local_problems import ChuteLocalProblems
-from helpers import benchmark
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 pytest.importorskip("skfem")
 
-table = benchmark("collection_table")
-regimes = benchmark("regimes")
-if table is None:
-    pytest.skip("a source distribution has no benchmarks", allow_module_level=True)
+from workshop.sets import collection_table as table
+from workshop.sets import regimes
+
 with table.PUBLISHED.open(newline="") as file:
     PUBLISHED = list(csv.DictReader(file))
 

@@ -4,9 +4,7 @@ import csv
 import functools
 import hashlib
 import http.server
-import importlib.util
 import io
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,6 +26,7 @@ from helpers_report import (
     read_data,
     skip_without_libraries,
 )
+from workshop.tables import report_size
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -521,16 +520,8 @@ def test_a_periodic_cell_is_outlined(browser: Any, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A site of 48,000 runs, of which curves have no bands and are not drawn value by value."""
-    benchmark = Path(__file__).parents[2] / "benchmarks" / "report_size.py"
-    if str(benchmark.parent) not in sys.path:
-        sys.path.append(str(benchmark.parent))
-    spec = importlib.util.spec_from_file_location("report_size", benchmark)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
     folder = tmp_path_factory.mktemp("large")
-    made.fill(folder / "runs.sqlite", 1200, 40)
+    report_size.fill(folder / "runs.sqlite", 1200, 40)
     with Campaigns([folder / "runs.sqlite"]) as campaigns:
         counts = build_site(campaigns, folder / "site", views=0)
     assert counts["runs"] == 48_000

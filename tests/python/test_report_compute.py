@@ -425,7 +425,7 @@ def written_by_3_1(path: Path, folder: Path) -> list[Path]:
     if not header.is_file() or "FCLIB_VERSION_MAJOR" in header.read_text():
         return []
     theirs = next(Path("/usr/lib").rglob("libfclib.so.0"))
-    source = ROOT / "benchmarks" / "files_against_libfclib.c"
+    source = ROOT / "workshop/tables/files_against_libfclib.c"
     program, written = folder / "copy", folder / f"{path.stem} by 3.1.hdf5"
     build = [compiler("C"), f"-I{HEADERS}", "-o", str(program), str(source), "-ldl"]
     subprocess.run(build, check=True)

@@ -19,9 +19,11 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import catalog, choose, known
+from fclib.collections import catalog, known
 from fclib.collections.plan import Plan
 from fclib.scenes.local_problems import LocalProblems
+from workshop.sets import choose
+from workshop.sets.__main__ import app as lists
 
 TINY = known.DATA / "tiny"
 FILES = sorted(TINY.glob("*/*.hdf5"))
@@ -221,8 +223,8 @@ def test_hard_is_chosen_from_a_store_and_built(
         *("--tol", 1e-8, "--time-limit", 5, "--store", store),
     )
     assert done.exit_code in (0, 1), done.output
-    args = ("collection", "choose", "hard", store, "--in", known.DATA)
-    assert invoke(*args, "--out", data / "hard.json").exit_code == 0
+    args = ["hard", store, "--in", known.DATA, "--out", data / "hard.json"]
+    assert CliRunner().invoke(lists, [str(word) for word in args]).exit_code == 0
     rule = json.loads((data / "hard.json").read_text())["rule"]
     assert rule["time_limits"] == [5.0]
     monkeypatch.setattr(known, "DATA", data)

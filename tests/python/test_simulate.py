@@ -32,6 +32,7 @@ from fclib.simulate import (  # noqa: E402
 )
 from fclib.simulate.arrays import added  # noqa: E402
 from fclib.simulate.equalities import are_independent, dependence  # noqa: E402
+from workshop.tables import loop_rounding  # noqa: E402
 
 G = 9.81  # m/s^2
 H = 5e-3  # s
@@ -250,14 +251,9 @@ def test_a_contradiction_is_named_at_every_size_and_place(size: float, away: flo
 
 
 @pytest.mark.parametrize(("size", "away"), [(1.0, 0.0), (1e-3, 1.0), (1.0, 1e6)])
-def test_a_loop_that_moves_only_since_rows_depend_keeps_moving(
-    size: float, away: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_loop_that_moves_only_since_rows_depend_keeps_moving(size: float, away: float) -> None:
     """Bennett's linkage: each step opens it, where its rows are independent and would lock it."""
-    # scripts of benchmarks/ import what stands beside them
-    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "benchmarks")
-    made: Any = importlib.import_module("loop_rounding")
-    xml = made.document(made.bennett(size), size, away, 0.7, 0.0)
+    xml = loop_rounding.document(loop_rounding.bennett(size), size, away, 0.7, 0.0)
     for step in simulate(Scene(name="loop", xml=xml), 150):
         assert step.result.converged
         assert np.abs(np.asarray(step.result.solution.l)).max() * size < 1

@@ -18,16 +18,9 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import (
-    candidates,
-    choose,
-    features,
-    known,
-    published,
-    select,
-    standing,
-    trajectory,
-)
+from fclib.collections import known, published, standing, trajectory
+from workshop.sets import candidates, choose, features, select
+from workshop.sets.__main__ import app as lists
 
 load: Any = fclib.load
 there = pytest.mark.skipif(
@@ -37,6 +30,11 @@ there = pytest.mark.skipif(
 
 def invoke(*arguments: object) -> Any:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def listed(*arguments: object) -> Any:
+    """A command of workshop/sets."""
+    return CliRunner().invoke(lists, [str(argument) for argument in arguments])
 
 
 # ---- candidates
@@ -474,8 +472,7 @@ def test_list_grows_by_what_runs_class_hard_or_open(
     choose.write_list(before, [tiny["Capsules"], tiny["Wall"]], {"share": 0.5})
     more = ("--set", "rt444", "--per-family", 2, "--version", "9")
     place = states / published.FOLDER
-    args = ("collection", "choose", "hard", "--keep", before, *more)
-    done = invoke(*args, "--out", after, "--states", place)
+    done = listed("hard", "--keep", before, *more, "--out", after, "--states", place)
     assert done.exit_code == 0, done.output
     made = json.loads(after.read_text())
     assert made["rule"] == {"share": 0.5, "grown": {"sets": ["rt444"], "per_family": 2}}
@@ -485,7 +482,7 @@ def test_list_grows_by_what_runs_class_hard_or_open(
     assert names == [kept[0], "Capsules_rt444/150 9", "Chain/10 9", "Chain/30 9", kept[1]]
     # from what it made it makes the same
     again = tmp_path / "again.json"
-    assert invoke(*args[:3], "--keep", after, *more, "--out", again).exit_code == 0
+    assert listed("hard", "--keep", after, *more, "--out", again).exit_code == 0
     assert again.read_text() == after.read_text()
 
     monkeypatch.setattr(known, "DATA", after.parent)
@@ -513,8 +510,9 @@ def test_list_grows_by_what_runs_class_hard_or_open(
         shown = invoke("collection", "show", "hard/Capsules_rt444")
         assert scenes.get("Capsules").title in shown.output
         # what is neither way of choosing is refused, and a list of no version
-        assert invoke(*args[:3], "--out", again).exit_code == 2
-        assert invoke(*args[:-1], "1", "--out", again).exit_code == 2
-        assert invoke(*args, before, "--out", again).exit_code == 2
+        assert listed("hard", "--out", again).exit_code == 2
+        args = ("hard", "--keep", before, *more, "--out", again)
+        assert listed(*args, "--version", "1").exit_code == 2
+        assert listed(*args, before).exit_code == 2
     finally:
         known.choices.cache_clear()

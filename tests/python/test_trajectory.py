@@ -27,7 +27,7 @@ from fclib import collections, simulate
 from fclib.collections import known, published, trajectory
 from fclib.collections.plan import Plan, Simulation
 from fclib.collections.record import record
-from helpers import benchmark
+from workshop.sets import collection_table
 
 read: Any = fclib.read
 FOLDER = "rt444/BoxesStack"
@@ -453,13 +453,8 @@ DEEPER = {
     "Chute1000": 0.4,
     "Chute4000": 0.5,
 }
-table = benchmark("collection_table")
-SIZES: dict[str, dict[str, str]] = {}
-if table is not None:
-    with table.PUBLISHED.open(newline="") as file:
-        SIZES = {
-            row["ours"]: row for row in csv.DictReader(file) if row["ours"].startswith("rr9118/")
-        }
+with collection_table.PUBLISHED.open(newline="") as file:
+    SIZES = {row["ours"]: row for row in csv.DictReader(file) if row["ours"].startswith("rr9118/")}
 # ends that other ends exclude, or that the page explains
 NOT_MET = {
     "rr9118/CubesH8": ("density",),
@@ -563,7 +558,7 @@ def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any
         sizes.append({"n": problem.n, "nc": problem.nc, "density": problem.m / problem.n})
     if row:
         # where the published ranges of a set allow it; both ends to a tenth, as the table says
-        off = {word.split()[0] for word in table.within(row, sizes, []).split(", ")}
+        off = {word.split()[0] for word in collection_table.within(row, sizes, []).split(", ")}
         assert off <= {"yes", *NOT_MET.get(folder, ())}
 
 
@@ -589,7 +584,6 @@ def deepest(name: str, states: Any) -> float:
 
 
 @there
-@pytest.mark.skipif(not SIZES, reason="a source distribution has no benchmarks")
 def test_the_published_sizes_are_those_of_sets_with_states() -> None:
     assert {folder for folder in SIZES if PRESENT[folder] in STORED} >= set(NOT_MET)
     assert sum(PRESENT[folder] in STORED for folder in SIZES) >= 12

@@ -6,12 +6,15 @@ import contextlib
 import fcntl
 import functools
 import importlib.metadata
+import json
 import os
 import platform
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
+
+from fclib.bench.made import cache_folder
 
 CPUINFO = Path("/proc/cpuinfo")
 SCALING = Path("/sys/devices/system/cpu/cpu0/cpufreq")
@@ -43,6 +46,21 @@ def _version(package: str) -> str:
         return ""
 
 
+def calibration_file() -> Path:
+    """The file in the user's cache with the calibration of this machine; it may be missing."""
+    own = f"{platform.node()}-{_cpuinfo('model name')}-{os.cpu_count()}"
+    name = "".join(c if c.isalnum() else "-" for c in own)
+    return cache_folder() / f"calibration-{name}.json"
+
+
+def _calibration() -> dict[str, Any]:
+    """The calibration of this machine, as a fact of it; empty if there is none."""
+    try:
+        return {"calibration": json.loads(calibration_file().read_text(encoding="utf-8"))}
+    except (OSError, ValueError):
+        return {}
+
+
 @functools.cache
 def facts() -> dict[str, Any]:
     """The facts of this machine and its software that a store keeps, in JSON's types."""
@@ -60,6 +78,7 @@ def facts() -> dict[str, Any]:
         "fclib": _version("fclib"),
         "numpy": _version("numpy"),
         "scipy": _version("scipy"),
+        **_calibration(),
     }
 
 

@@ -156,13 +156,14 @@ def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
 
     def make(folder: Path) -> None:
         for number in range(count):
-            problem = _plant(contacts, spacedim, seed + number)
+            problem = plant(contacts, spacedim, seed + number)
             _core.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
 
     return made(recipe, make)
 
 
-def _plant(nc: int, d: int, seed: int) -> _core.LocalProblem:
+def plant(nc: int, d: int, seed: int) -> _core.LocalProblem:
+    """One of `planted`, with nc contacts of d components."""
     import scipy.sparse as sp
 
     random = np.random.Generator(np.random.PCG64([seed, nc, d]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest
+from fclib._origin import origin_of
 from fclib.bench.job import ProblemFacts
 
 SUFFIXES = (".hdf5", ".h5")
@@ -186,7 +186,7 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     return ProblemFacts(
         hash=_digest.digest(problem),
         name=f"{path.parent.name}/{path.stem}" if path.stem[0].isdigit() else path.stem,
-        family=family or _scene_of(problem.info) or path.parent.name,
+        family=family or str(origin_of(problem.info).get("scene", "")) or path.parent.name,
         path=str(path),
         kind=problem.kind,
         formulation=problem.formulation,
@@ -197,12 +197,3 @@ def look(path: Path, family: str = "") -> ProblemFacts:
         nnz=int(getattr(matrix, "nnz", getattr(matrix, "size", 0))),
         title=problem.info.title,
     )
-
-
-def _scene_of(info: _core.ProblemInfo) -> str:
-    """The family that a simulated problem names in the last line of its description."""
-    lines = info.description.splitlines()
-    try:
-        return str(json.loads(lines[-1])["scene"])
-    except (IndexError, KeyError, TypeError, ValueError):
-        return ""

@@ -23,7 +23,7 @@ import sqlite3
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +52,7 @@ from fclib.bench.layout import (
     VERSION,
     layouts,
 )
-from fclib.bench.table import TEXTS, Column, Table, Words, numbers_of
+from fclib.bench.table import TEXTS, Column, Table, Words, numbers_of, object_in
 
 PATIENCE = 60.0  # [s] to wait for another writer
 BATCH = 20_000  # rows read at once: some 20 MB
@@ -1021,6 +1021,59 @@ class Store:
         if lost:
             other._warn(f"{_rows_of(lost)} of runs", len(lost), "of damaged rows, and left out")
         return added
+
+    def add_rows(
+        self, rows: Iterable[Mapping[str, Any]], machines: Mapping[str, Mapping[str, Any]]
+    ) -> int:
+        """Take over runs that are rows of `results`, with `kind`, and `history` as dicts.
+
+        A run whose key is there, of a machine of this node, is left out.
+
+        Args:
+            rows: from another store. Columns that are left out are missing values.
+            machines: the facts of each machine, by the `node` of its rows.
+
+        Returns:
+            The number of new runs.
+        """
+        insert = f"INSERT INTO runs ({', '.join(RUN)}) SELECT {_marks(RUN)}"
+        insert += " WHERE NOT EXISTS (SELECT 1 FROM runs JOIN machines"
+        insert += " ON machines.id = runs.machine WHERE runs.key = ? AND machines.node = ?)"
+        added, first = 0, 0
+        with self.transaction():
+            for row in rows:
+                own = {**row, "name": row["problem"], "path": row.get("path") or ""}
+                problem = self._id("problems", PROBLEM, [own.get(name) for name in PROBLEM])
+                values = [row[name] for name in ("solver", "solver_name", "options", "version")]
+                about = [row.get(name) for name in ("solver_family", "origin", "about")]
+                digest = "\n".join(map(str, values))
+                solver = self._id("solvers", SOLVER, (digest, *values, *about))
+                facts = {**machines.get(row["node"], {}), "node": row["node"]}
+                text = json.dumps(facts, sort_keys=True)
+                columns = (text, *(facts.get(name) for name in MACHINE[1:-1]), text)
+                machine = self._id("machines", MACHINE, columns)
+                own |= {"campaign": None, "problem": problem, "solver": solver, "machine": machine}
+                cursor = self.db.execute(insert, [*map(own.get, RUN), row["key"], row["node"]])
+                if cursor.rowcount:
+                    added += 1
+                    first = first or cursor.lastrowid
+                    history = [[one[name] for name in HISTORY] for one in row.get("history") or ()]
+                    self._add_more(cursor.lastrowid, None, None, history)
+            if first:
+                self._seal("runs", "id >= ?", first)
+        return added
+
+    def machines(self) -> dict[str, dict[str, Any]]:
+        """The facts of the machines of all runs, by the column `machine`."""
+        return {row["hash"]: object_in(row["facts"]) for row in self._by_number("machine").values()}
+
+    def kinds(self) -> dict[str, str]:
+        """The kind of each problem, by its hash."""
+        return {row["hash"]: row["kind"] for row in self._by_number("problem").values()}
+
+    def campaigns(self) -> list[dict[str, Any]]:
+        """The campaigns, in the order in which they began."""
+        return list(self._by_number("campaign").values())
 
     def export(self, path: str | Path) -> int:
         """Write `results` as .csv or .parquet, whole or not at all. Return the number of rows.

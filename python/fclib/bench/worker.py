@@ -43,7 +43,7 @@ from fclib.external import command, plugin
 CACHE = 256e6  # [bytes] size of the problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
 CERTIFICATE = ("certificate_y", "certificate_z")
-STAGE = ("name", "calls", "solved", "iterations", "time")
+STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
 HISTORY = 500  # number of reports kept of a run, with the first and the last
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.ENFILE)
@@ -181,7 +181,7 @@ def answer(
             guess=guess,
             **order["options"],
         )
-        status, message = result.status, ""
+        status, message = result.status, result.message
     except Exception as error:
         status, message = classify(error, foreign(name)), one_line(error)
     say("done")

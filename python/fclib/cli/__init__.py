@@ -11,8 +11,6 @@ _progress.py   bars for long work: a build, a campaign
 _files.py      files that hold several things
 _build.py      the build of `collection` and `simulate`
 _profile.py    the profile of `profile` and `demo`
-
-`choose.py` has the commands of ``fclib collection choose``, which `collection.py` takes in.
 """
 
 from __future__ import annotations
@@ -37,8 +35,10 @@ COMMANDS = (
     "solvers",
     "simulate",
     "record",
+    "judge",
     "demo",
     "profile",
+    "results",
     "report",
     "view",
     "doctor",

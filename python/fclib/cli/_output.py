@@ -151,6 +151,22 @@ def load_modules(paths: Sequence[Path] | None) -> None:
         usage_error(error)
 
 
+def parse_solver(text: str, pairs: Sequence[str] = ()) -> tuple[str, dict[str, str]]:
+    """A solver, checked, and its options: those of its text, as "nsgs relaxation=1.2", and others.
+
+    A solver or an option that is unknown is a usage error.
+    """
+    from fclib.bench.campaign import CampaignError, parse_solver
+
+    try:
+        entries = parse_solver(text)
+        options = entries.get("options", {}) | parse_options(pairs)
+        fclib.find_solver(entries["name"]).check_options(options)
+    except (CampaignError, fclib.OptionError) as error:
+        usage_error(error)
+    return entries["name"], options
+
+
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:
     """``["relaxation=1.2"]`` as a dictionary; anything else is a usage error.
 
@@ -306,8 +322,8 @@ class Report:
             typer.echo(json.dumps({"problem": str(path), "message": str(error)}))
         err.print(f"fclib: {error}", style="red", highlight=False)
 
-    def finish(self) -> NoReturn:
-        """Print the table, and exit with the status."""
+    def finish(self, words: str = "") -> NoReturn:
+        """Print the table and a line below it, and exit with the status."""
         if self.records and not self.as_json:
             paths = [record["problem"] for record in self.records]
             names = [Path(path).name for path in paths]
@@ -322,6 +338,8 @@ class Report:
                     ]
                 )
             )
+            if words:
+                out.print(words, highlight=False)
         raise typer.Exit(int(self.failed))
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from fclib.bench import MeritKind, comparison, profiles
 from fclib.bench.campaign import published_means
@@ -16,15 +18,54 @@ from fclib.bench.store import Store
 from fclib.bench.table import Table
 from fclib.cli._output import Report, Rows, err, out
 
+PUBLISHED = "published"  # a word of --with
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
 # columns of the summary that are shown only if one of them has a value
 RARE = ("unsuitable", "spread", "copies")
+
+
+With = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--with", help='Published runs beside these: "published", or files of `fclib results`.'
+    ),
+]
+AsMeasured = Annotated[
+    bool,
+    typer.Option("--as-measured", help="Leave the times of --with as they are on their machine."),
+]
+
+
+@contextmanager
+def joined(
+    store: Path, beside: Sequence[str] | None, machine: str | None, as_measured: bool
+) -> Iterator[tuple[Path, str]]:
+    """The store, with published runs beside its own if they are asked for, and a note on them."""
+    if not beside:
+        yield store, ""
+        return
+    from fclib import results
+
+    parts: list[Path] = []
+    for name in beside:
+        if name != PUBLISHED:
+            parts.append(Path(name))
+            continue
+        where = results.folder()
+        found = sorted(where.glob("*.parquet")) if where is not None else []
+        if not found:
+            raise results.ShardError("no runs are published here: pip install fclib-results")
+        parts += found
+    with results.beside(store, parts, machine, scale=not as_measured) as found_beside:
+        scaled = "" if not as_measured else ", as they were measured on their machine"
+        yield found_beside.path, f"{found_beside}{scaled}"
 
 
 def print_profile(
     store: Path,
     folder: Path | None,
     *,
+    note: str = "",
     metric: str = "cpu_s",
     solver: Sequence[str] = (),
     family: Sequence[str] = (),
@@ -80,7 +121,7 @@ def print_profile(
         "along": [] if both is None else profiles.along(store, both, campaign),
         "not run": profiles.failures(faults),
     }
-    said = Said(rows, compared, penalty, shift, weigh, own_set)
+    said = Said(rows, compared, penalty, shift, weigh, own_set, note)
     if not quiet and as_json:
         report = Report(True)
         for table, records in tables.items():
@@ -103,12 +144,14 @@ class Said:
     shift: float
     weigh: profiles.Weigh
     own_set: bool
+    note: str  # on published runs
 
     def caption(self, costs: profiles.Costs) -> str:
         """Make them from costs at one tolerance or at several."""
         tols = comparison.numbers_in(self.rows, "tol")
         own = self.rows.where(np.isin(tols, costs.tolerances))
-        return profiles.caption(costs, own, self.weigh, self.own_set)
+        words = profiles.caption(costs, own, self.weigh, self.own_set)
+        return f"{words}; {self.note}" if self.note else words
 
 
 def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: Said) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from contextlib import ExitStack
@@ -28,7 +29,9 @@ from fclib.cli._output import (
     interrupted,
     out,
     parse_options,
+    progress_bar,
     usage_error,
+    words_of,
 )
 from fclib.cli._progress import duration, live
 from fclib.collections import library
@@ -120,6 +123,14 @@ def run(
         bool,
         typer.Option("--send", help="Send the problems to the workers, which share no folder."),
     ] = False,
+    calibrate: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate",
+            help="Time a fixed set of solves on this machine, for a minute. Stores say it from then"
+            " on, and published runs of other machines can be put beside yours.",
+        ),
+    ] = False,
     status: Annotated[
         Path | None, typer.Option(help="Show how far the campaigns of a store are.")
     ] = None,
@@ -128,6 +139,9 @@ def run(
     """Run a campaign, or go on if it was interrupted."""
     if status is not None:
         show_status(status, as_json)
+        return
+    if calibrate:
+        calibrate_here(as_json)
         return
     flags: dict[str, Any] = {
         "tolerances": tol,
@@ -260,6 +274,29 @@ def describe(status: Status) -> dict[str, Any]:
         "started": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.started)),
         "on": status.node,
     }
+
+
+def calibrate_here(as_json: bool) -> None:
+    """Calibrate this machine, and print the times."""
+    from fclib.bench import calibration
+
+    count = len(calibration.SIZES) * len(calibration.SOLVERS)
+    with progress_bar(count) as show:
+        found = calibration.calibrate(show=show)
+    try:
+        path = calibration.save(found)
+    except OSError as error:
+        fail(words_of(error))
+    if as_json:
+        typer.echo(json.dumps(found.record()))
+        return
+    rows = [{"solve": name, "CPU [s]": value} for name, value in found.seconds.items()]
+    out.print(Rows(rows))
+    err.print(
+        f"{path}; the load was {found.load:.2g}, and the repeats differ by {found.spread:.1%}"
+        " (quartiles, median of the solves)",
+        highlight=False,
+    )
 
 
 def show_status(path: Path, as_json: bool) -> None:

@@ -183,4 +183,4 @@ def command(
         elif rows:
             out.print(Rows(rows, title=path.name))
         report.add(record, judgement.ok)
-    report.finish()
+    report.finish("" if certificate is not None else f"the tolerance is {tol:g} (--tol)")

@@ -17,7 +17,6 @@ from fclib import collections
 from fclib._judge import TOLERANCE
 from fclib._verdicts import CLASSES
 from fclib.bench import Store
-from fclib.cli import choose
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -42,7 +41,7 @@ from fclib.cli._output import (
     words_of,
 )
 from fclib.cli._progress import many_bars
-from fclib.collections import catalog, references, standing
+from fclib.collections import catalog, library, references, standing
 from fclib.collections.archives import FetchError
 from fclib.collections.known import KNOWN, choices, distinct_of, kind_of, problems_of
 from fclib.collections.plan import evenly
@@ -51,8 +50,6 @@ from fclib.collections.verify import LACKING
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
 )
-app.add_typer(choose.app, name="choose")
-
 
 MOST_COPIES = 10  # largest number of copies named; the catalogue has all
 
@@ -212,7 +209,6 @@ def build(
         typer.Argument(help="Sets, families, or problems: SET/FAMILY/NUMBER."),
     ] = None,
     listed: ListFile = None,
-    every: Annotated[bool, typer.Option("--all", help="All families of the set rt444.")] = False,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
         "collection"
     ),
@@ -257,10 +253,10 @@ def build(
     Families without stored states are simulated first.
     """
     names = named(names, listed)
-    if every == bool(names):
-        raise typer.BadParameter("name sets, families or problems, or say --all")
+    if not names:
+        raise typer.BadParameter("name sets, families or problems")
     try:
-        folders = collections.numbered(names or ["rt444"], version)
+        folders = collections.numbered(names, version)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     try:
@@ -426,6 +422,52 @@ def verify(folder: Folder, as_json: Json = False) -> None:
             if origins[origin]:
                 out.print(f"{origins[origin]} problems {words}")
     raise typer.Exit(int(report.failed))
+
+
+FOUND = ("id", "nc", "n", "mu_max", "law", "formulation", "rating", "same_as")
+
+
+@app.command()
+def find(
+    condition: Annotated[str, typer.Argument(help='As "nc > 1000 and mu < 0.5".')],
+    folder: Annotated[
+        Path | None,
+        typer.Option("--in", help="Folder of a collection; by default that of built problems."),
+    ] = None,
+    files: Annotated[
+        bool,
+        typer.Option("--files", help="Print a path a line: of the global form if there is one."),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Find the problems of a collection by the columns of its catalogue.
+
+    A condition compares columns, numbers and texts, with and, or, not and brackets. A comparison
+    with a missing value is not true. "same_as is None" leaves out the copies.
+    """
+    folder = folder or library.default_folder()
+    report = Report(as_json)
+    try:
+        table = collections.read_catalog(folder)
+        rows = catalog.where(table, condition).to_pylist()
+    except catalog.ConditionError as error:
+        usage_error(error)
+    except (collections.CatalogError, ImportError) as error:
+        fail(str(error))
+    root = folder if folder.is_dir() else folder.parent
+    for row in rows:
+        if as_json:
+            report.add(row)
+        elif files:
+            out.print(
+                root / (row["global_file"] or row["local_file"]), soft_wrap=True, highlight=False
+            )
+        else:
+            report.add({name: row[name] for name in FOUND})
+    if not (as_json or files):
+        if rows:
+            out.print(Rows(report.records))
+        out.print(f"{len(rows)} of {table.num_rows} problems")
 
 
 @app.command()

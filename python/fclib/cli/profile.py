@@ -10,7 +10,7 @@ import typer
 
 from fclib.bench import profiles
 from fclib.cli._output import Json, MeritKind, fail
-from fclib.cli._profile import print_profile
+from fclib.cli._profile import AsMeasured, With, joined, print_profile
 
 Metric = Enum("Metric", {name: name for name in profiles.METRICS}, type=str)  # type: ignore[misc]
 CPU_TIME = Metric("cpu_s")
@@ -84,6 +84,8 @@ def command(
     formats: Annotated[
         str, typer.Option("--format", help="Formats of the pictures.")
     ] = "pdf,svg,png",
+    beside: With = None,
+    as_measured: AsMeasured = False,
     as_json: Json = False,
 ) -> None:
     """Compare the solvers of a store.
@@ -91,26 +93,28 @@ def command(
     Prints tables. With --out it draws pictures too.
     """
     try:
-        print_profile(
-            store,
-            out_dir,
-            metric=metric.value,
-            solver=solver or (),
-            family=family or (),
-            tol=tol or (),
-            campaign=campaign,
-            machine=machine,
-            merit=merit.value if merit else None,
-            start=start.value,
-            penalty=penalty,
-            shift=shift,
-            count_unsuitable=count_unsuitable,
-            own_set=own_set,
-            both_forms=forms is Forms.both,
-            weigh=weigh.value,
-            formats=formats.split(","),
-            as_json=as_json,
-        )
+        with joined(store, beside, machine, as_measured) as (whole, note):
+            print_profile(
+                whole,
+                out_dir,
+                note=note,
+                metric=metric.value,
+                solver=solver or (),
+                family=family or (),
+                tol=tol or (),
+                campaign=campaign,
+                machine=machine,
+                merit=merit.value if merit else None,
+                start=start.value,
+                penalty=penalty,
+                shift=shift,
+                count_unsuitable=count_unsuitable,
+                own_set=own_set,
+                both_forms=forms is Forms.both,
+                weigh=weigh.value,
+                formats=formats.split(","),
+                as_json=as_json,
+            )
     except ImportError as error:
         fail(f'{error}; pip install "fclib[bench]"')
     except ValueError as error:  # a format that Matplotlib does not know, and what fclib raises

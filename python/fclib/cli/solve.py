@@ -21,11 +21,21 @@ from fclib.cli._output import (
     each_file,
     err,
     load_modules,
-    parse_options,
-    usage_error,
+    parse_solver,
     warn_of,
 )
 
+# what a user may do after a status
+NEXT = {
+    "infeasible": "there is no solution, and the proof was checked; `fclib analyze` tells it",
+    "stalled": "no solution was found; `fclib analyze` says whether one is known to exist. A larger"
+    " --tol or another --solver may do",
+    "diverged": "this solver does not solve the problem; try --solver auto",
+    "iteration_limit": "the solver used all its iterations; try --solver auto or a larger --tol",
+    "time_limit": "the time was too short; give a larger --time-limit or --tol. --verbose shows how"
+    " the error falls",
+    "inaccurate": "the solver's own error is smaller than the true one; try --solver auto",
+}
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
 
 
@@ -53,7 +63,9 @@ class Trace:
 
 def command(
     files: Files,
-    solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "auto",
+    solver: Annotated[
+        str, typer.Option(help='A name of `fclib solvers`, as "nsgs" or "nsgs relaxation=1.2".')
+    ] = "auto",
     tol: Tolerance = 1e-8,
     merit: Merit = MeritKind.both,
     time_limit: Annotated[
@@ -83,11 +95,7 @@ def command(
         # the one solution of a file is that of its global problem
         raise typer.BadParameter("--write stores the solution of the main problem, not of a --kind")
     load_modules(module)
-    options = parse_options(option or [])
-    try:
-        fclib.find_solver(solver).check_options(options)
-    except fclib.OptionError as error:
-        usage_error(error)
+    solver, options = parse_solver(solver, option or [])
     report = Report(as_json, hidden=("stages", "certificate"))
     for path in each_file(files, "solving"):
         try:
@@ -118,4 +126,7 @@ def command(
                 )
                 record["certificate"] = proof.record(problem)
             report.add(record, run.status == "converged")
+    for status in {record["status"]: None for record in report.records if "status" in record}:
+        if status in NEXT:
+            err.print(f"{status}: {NEXT[status]}", highlight=False)
     report.finish()

@@ -11,7 +11,7 @@ The name of a problem is SET/FAMILY/NUMBER, for example rt444/KaplasTower/0100. 
 the steps of the family's scene that have a contact, or the problems of a family that is assembled
 directly.
 
-plan.py       which problems of a family are built, and which are kept
+plan.py       which problems of a family are built, and which are kept; their license and citation
 trajectory.py stored states, from which problems are assembled, and their files
 published.py  the trajectories of all published versions. Needs trajectory.py
 known.py      the sets, their versions and their families; lists of chosen problems in data/
@@ -25,14 +25,11 @@ add.py        takes existing files in as a set. Needs build.py, known.py, refere
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
 guesses.py    a guess for the next step's problem, from a solution
-rights.py     license and citation, in files and catalogues. Needs plan.py
 sequence.py   consecutive problems, with guesses. Needs guesses.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
-choose.py     the lists of chosen problems, by rules that anyone can repeat
-candidates.py states of all families, from which `standard` is chosen. Needs known.py, record.py
-features.py   numbers that describe a problem: its data, and how solvers behave on it
-select.py     the set `standard` from a table of features. Needs candidates.py, features.py
 standing.py   which problems are easy, hard or open, by stored runs. Needs known.py
+
+How the lists of data/ were chosen is in workshop/sets of the repository.
 """
 
 from fclib.collections.add import Refusal, Rules, add, plain

@@ -21,7 +21,7 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from multiprocessing import connection
@@ -33,10 +33,11 @@ import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
 from fclib._judge import TOLERANCE
-from fclib.collections import catalog, references, rights, standing, trajectory
+from fclib._origin import origin_of
+from fclib.collections import catalog, references, standing, trajectory
 from fclib.collections.catalog import STATE
 from fclib.collections.guesses import guess_of
-from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
+from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
 from fclib.collections.record import record
 from fclib.collections.references import Found
 
@@ -423,14 +424,14 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         found = references.best_first(found, item.problem, several)
         row |= found.row | {"tol": plan.tol}
     words, known = known_of(plan, item.problem, local, found, states, row)
-    info = rights.stamped(item.problem.info, plan, kept.looked, words)
+    info = stamped(item.problem.info, plan, kept.looked, words)
     for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = item.problem if form == "global" else local
         mine = found
         if found is not None and is_global and form == "local":
             mine = references.carried(found, local)
-        stamped = problem.replace(
+        with_info = problem.replace(
             info=info,
             matrix_info={
                 name: info
@@ -440,7 +441,7 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         )
         own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
         references.write(
-            out / path, stamped, mine, own, several, compression=COMPRESSION, sync=False
+            out / path, with_info, mine, own, several, compression=COMPRESSION, sync=False
         )
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
@@ -506,6 +507,7 @@ def solutions_of(states: Enumeration | None) -> list[_core.Solution]:
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
     """The row of a problem, without its solution and its files."""
+    facts = facts_of(item.problem)
     return {
         "id": f"{plan.name}/{number:04d}",
         "collection": plan.collection,
@@ -515,22 +517,25 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "step": item.step,
         "time": item.time,
         "seed": plan.scene.seed,
-        **facts_of(item.problem),
+        **facts,
         "bodies": item.bodies,
         **dict.fromkeys(
             ("open", "stick", "slide", "solver", "status", "tol", "error", "has_solution")
         ),
+        "rating": standing.classes(plan.collection).get(facts["digest"]),
         "left_out": "; ".join(item.left_out) or None,
-        **rights.of(plan),
+        **rights_of(plan),
     }
 
 
 def facts_of(problem: Any) -> dict[str, Any]:
     """The columns of a row on a problem's data, whatever its origin."""
     mu = np.asarray(problem.mu)
+    rolls = problem.kind.endswith("rolling")
     return {
         "title": problem.info.title,
         "formulation": problem.formulation,
+        "law": "rolling" if rolls else "Coulomb" if mu.any() else "none",
         "spacedim": problem.spacedim,
         "n": problem.n,
         "p": problem.p,
@@ -541,6 +546,31 @@ def facts_of(problem: Any) -> dict[str, Any]:
         "nnz_M": nnz(problem.M) if problem.n else None,
         "nnz_H": nnz(problem.H) if problem.n else None,
         "digest": _digest.digest(problem),
+        **made_by(origin_of(problem.info)),
+    }
+
+
+def made_by(origin: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns of a row on the time step and the programs, from the origin of a problem."""
+
+    def number(name: str) -> float | None:
+        value = origin.get(name)
+        return float(value) if isinstance(value, (int, float)) else None
+
+    # a file of somebody else's may hold anything
+    theta, law = number("theta"), str(origin.get("law", ""))
+    own = origin.get("engine")
+    engine = own if isinstance(own, dict) else {"name": own, "version": origin.get("version")}
+    versions = {name: origin.get(name) for name in ("fclib", "mujoco", "scikit-fem")}
+    versions |= {str(engine.get("name")): engine.get("version") if engine.get("name") else None}
+    programs = [f"{name} {version}" for name, version in versions.items() if version]
+    return {
+        "h": number("time_step"),
+        "theta": theta,
+        "restitution": number("restitution"),
+        "scheme": (law or None) if theta is None else f"Moreau-Jean, {law}",
+        "engine": ", ".join(programs) or None,
+        "elastic": "scikit-fem" in origin if origin.get("generator") == "fclib.simulate" else None,
     }
 
 

@@ -5,16 +5,20 @@ It holds nothing that depends on the machine or the hour: two builds give equal 
 
 from __future__ import annotations
 
+import ast
+import functools
 import hashlib
 import importlib
 import json
+import operator
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from fclib import _core
+from fclib._meant import meant as suggestion
 
 FILE = "catalog.parquet"
 PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution
@@ -36,10 +40,17 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("seed", "int64", "of the scene; null for an MJCF file"),
     ("title", "string", "of the problem"),
     ("formulation", "string", "of the global form, or the only one, in RT-0444's abbreviations"),
+    ("law", "string", "of friction: Coulomb, rolling, or none if mu is 0"),
     ("spacedim", "int32", "components of a contact"),
     ("n", "int32", "degrees of freedom of the bodies that contacts move; 0 for a local problem"),
     ("p", "int32", "bilateral constraints"),
     ("nc", "int32", "contacts"),
+    ("h", "float64", "time step [s]; null where nobody said"),
+    ("theta", "float64", "of the Moreau-Jean scheme; null for other schemes"),
+    ("restitution", "float64", "coefficient of Newton's impact law; null where nobody said"),
+    ("scheme", "string", "time stepping and law of contact: Moreau-Jean, velocity or gap"),
+    ("engine", "string", "programs that made the data, with their versions"),
+    ("elastic", "bool", "whether the bodies deform; null where nobody said"),
     ("bodies", "int32", "bodies, or trees of bodies, among which the contacts are, if simulated"),
     ("density", "float64", "spacedim nc / n, contact components for a degree of freedom"),
     ("mu_min", "float64", "smallest coefficient of friction"),
@@ -60,6 +71,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
         "whether that is a solution, and stored as one; null: none was looked for",
     ),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
+    ("rating", "string", "easy, hard or open, by stored runs; null: the problem was not run"),
     ("left_out", "string", "what the scene asked for and no problem holds; null: nothing"),
     ("digest", "string", "fclib.digest of the global form, or the only one"),
     ("same_as", "string", "the first problem of this catalogue with the same data; null: itself"),
@@ -100,6 +112,10 @@ ANALYSIS: tuple[str, ...] = (
 
 class CatalogError(_core.Error):
     """A catalogue is missing, or is not one."""
+
+
+class ConditionError(_core.Error, ValueError):
+    """A condition on the rows of a catalogue cannot be understood."""
 
 
 def arrow() -> Any:
@@ -169,6 +185,95 @@ def read_catalog(path: str | Path) -> Any:
             nothing = pa.nulls(table.num_rows, pa.type_for_alias(kind))
             table = table.add_column(place, name, nothing)
     return table
+
+
+# the names of RT-0444 for columns, in conditions
+ALIASES: Mapping[str, str] = {"mu": "mu_max", "dof": "n"}
+COMPARISONS: Mapping[type, Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+
+
+def where(table: Any, condition: str) -> Any:
+    """The rows of a catalogue of which a condition is true; one on a missing value is not.
+
+    Args:
+        table: as `read_catalog` returns it.
+        condition: comparisons of columns, numbers and texts, with and, or, not and brackets:
+            "nc > 1000 and mu < 0.5 and family != 'Chain'". `mu` is mu_max, `dof` is n. `same_as is
+            None` asks for a missing value.
+
+    Raises:
+        ConditionError: it is not one, or names no column.
+    """
+    pa = arrow()
+    compute = importlib.import_module("pyarrow.compute")
+
+    def term(node: ast.expr) -> Any:
+        if isinstance(node, ast.Constant) and isinstance(node.value, (bool, int, float, str)):
+            return compute.scalar(node.value)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            value = getattr(node.operand, "value", None)
+            if isinstance(value, (int, float)):
+                return compute.scalar(-value)
+        if isinstance(node, ast.Name):
+            name = ALIASES.get(node.id, node.id)
+            if name in table.column_names:
+                return compute.field(name)
+            raise ConditionError(
+                f"{condition!r}: there is no column {node.id!r};"
+                f" {suggestion(node.id, table.column_names)}"
+                f"there is: {', '.join(sorted(table.column_names))}"
+            )
+        raise refused(node)
+
+    def comparison(left: ast.expr, relation: ast.cmpop, right: ast.expr) -> Any:
+        if isinstance(relation, (ast.Is, ast.IsNot)):
+            if not (isinstance(right, ast.Constant) and right.value is None):
+                raise refused(right)
+            return (
+                term(left).is_valid() if isinstance(relation, ast.IsNot) else term(left).is_null()
+            )
+        if type(relation) in COMPARISONS:
+            return COMPARISONS[type(relation)](term(left), term(right))
+        raise refused(right)
+
+    def truth(node: ast.expr) -> Any:
+        if isinstance(node, ast.BoolOp):
+            join = operator.and_ if isinstance(node.op, ast.And) else operator.or_
+            return functools.reduce(join, map(truth, node.values))
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return ~truth(node.operand)
+        if isinstance(node, ast.Compare):
+            values = [node.left, *node.comparators]
+            parts = map(comparison, values, node.ops, values[1:])
+            return functools.reduce(operator.and_, parts)
+        if isinstance(node, ast.Name):
+            return term(node)
+        raise refused(node)
+
+    def refused(node: ast.expr) -> ConditionError:
+        return ConditionError(
+            f"{condition!r}: {ast.unparse(node)!r} is not understood; write comparisons of columns,"
+            ' as in "nc > 1000 and mu < 0.5"'
+        )
+
+    try:
+        asked = truth(ast.parse(condition.strip(), mode="eval").body)
+        return table.filter(asked)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        if isinstance(error, ConditionError):
+            raise
+        reason = str(error).splitlines()[0] if str(error) else "too long"
+        raise ConditionError(f"{condition!r}: is no condition: {reason}") from None
+    except (NotImplementedError, TypeError, pa.ArrowException) as error:
+        reason = str(error).splitlines()[0]
+        raise ConditionError(f"{condition!r}: values that cannot be compared: {reason}") from None
 
 
 def with_copies(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -129,23 +129,28 @@ class Collection(Sequence[Problem]):
         return self._catalog
 
     def filter(
-        self, rows: Callable[[Mapping[str, Any]], bool] | None = None, /, **columns: Any
+        self, rows: str | Callable[[Mapping[str, Any]], bool] | None = None, /, **columns: Any
     ) -> Collection:
         """The problems whose rows of the catalogue meet all conditions.
 
         >>> problems.filter(family="Chain", nc=(10, 20), mu_max=lambda mu: mu < 0.5)
+        >>> problems.filter("nc > 1000 and mu < 0.5")
         >>> problems.filter(lambda row: row["slide"] > row["stick"])
 
         Args:
-            rows: called with each row, as a dict by column.
+            rows: a condition in words, as `fclib collection find` takes it; or a function, called
+                with each row, as a dict by column.
             columns: the condition on each column: a value; bounds (lowest, highest), None for no
                 bound; a list or a set of values; or a function that is true for the values wanted.
                 A row without a value is left out, unless None is asked for.
 
         Raises:
             KeyError: the catalogue has no such column.
+            ConditionError: the condition cannot be understood.
         """
         table = self.catalog
+        if isinstance(rows, str):
+            table = catalog.where(table, rows)
         if unknown := sorted(columns.keys() - set(table.column_names)):
             raise KeyError(
                 f"the catalogue of {self.name} has no column {unknown[0]!r}; there are: "
@@ -155,13 +160,14 @@ class Collection(Sequence[Problem]):
         for name, wanted in columns.items():
             for k, value in enumerate(table[name].to_pylist()):
                 kept[k] = kept[k] and is_wanted(value, wanted)
-        if rows is not None:
+        if callable(rows):
             for k, row in enumerate(table.to_pylist()):
                 kept[k] = kept[k] and bool(rows(row))
         found = copy.copy(self)
         found._catalog = table.filter(catalog.arrow().array(kept, "bool"))
         found._places = None
-        said = [] if rows is None else [getattr(rows, "__name__", "...")]
+        words = rows if isinstance(rows, str) else getattr(rows, "__name__", "...")
+        said = [] if rows is None else [words]
         said += [f"{name}={wanted!r}" for name, wanted in columns.items()]
         found._filters = (*self._filters, ", ".join(said))
         return found

@@ -1,7 +1,8 @@
-"""Which families are built, and which of their problems are kept."""
+"""Which families are built, and which of their problems are kept; their license and citation."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from collections.abc import Sequence
@@ -27,6 +28,11 @@ HARD_TOLERANCE = 1e-6
 HARD_SWEEPS = 2000
 # largest penetration in a stored state, relative to the smallest body's diameter
 DEEPEST = 0.02
+LICENSE = "CC-BY-4.0"  # license of the data; the software has another
+CITATION = (
+    "V. Acary, M. Bremond, T. Koziara, F. Perignon, FCLIB: a collection of discrete 3D Frictional"
+    " Contact problems, Inria RT-0444, 2014; set {set}, version {version}"
+)
 
 
 def families() -> dict[str, type[scenes.Described]]:
@@ -239,3 +245,36 @@ def origin(scene: Source) -> dict[str, Any]:
         "ignore": list(scene.ignore),
         "planar": scene.planar,
     }
+
+
+@functools.cache
+def is_ours(scene: str) -> bool:
+    """Whether a scene has the name of a family."""
+    return scene in families()
+
+
+def rights_of(plan: Plan) -> dict[str, str | None]:
+    """License and citation of a plan's problems; both are empty for a scene that is not ours."""
+    if not is_ours(plan.scene.name):
+        return {"license": None, "citation": None}
+    citation = CITATION.format(set=plan.collection, version=plan.version)
+    return {"license": LICENSE, "citation": citation}
+
+
+def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -> _core.ProblemInfo:
+    """The info; the JSON at the end of its description has these facts and the problem's name.
+
+    The facts on existence and uniqueness come after those that the family states.
+    """
+    if facts:
+        said = info.math_info.rstrip(". ")
+        info = info.replace(math_info=f"{said}. {facts}" if said else facts)
+    *words, last = info.description.split("\n")
+    try:
+        told: Any = json.loads(last)
+    except ValueError:
+        return info
+    own = {name: value for name, value in rights_of(plan).items() if value is not None}
+    known = {"collection": plan.collection, "version": plan.version, "number": number}
+    text = "\n".join([*words, json.dumps(told | known | own)])
+    return info.replace(description=text)

@@ -262,6 +262,15 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
     )
 
 
+@functools.lru_cache
+def classes(name: str) -> Mapping[str, str]:
+    """The class of each problem of a set that was run, by its digest; empty for other sets."""
+    try:
+        return {row.digest: row.rating for row in standings(name)[0] if row.rating}
+    except (KeyError, StandingError):
+        return {}
+
+
 def when(run: Run) -> str:
     """The order of runs: the later one counts."""
     return run.date

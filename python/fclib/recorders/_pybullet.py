@@ -98,9 +98,12 @@ def record(
         gaps.append(contact[8])
         reactions.append(h * np.array([contact[9], contact[10], contact[12]]))
     nc = len(rows)
+    w = np.zeros((nc, 3))
+    w[:, 0] = np.maximum(gaps, 0) / h
     contacts = Contacts(
         jacobian=np.reshape(rows, (3 * nc, n)),
         mu=mu,
+        w=w.ravel(),
         point=np.reshape(points, (nc, 3)),
         frame=np.reshape(frames, (nc, 3, 3)),
         bodies=np.reshape(pairs, (nc, 2)).astype(np.int64),
@@ -127,5 +130,8 @@ def record(
         guess=_core.Solution(r=np.ravel(reactions)) if nc else None,
         velocity=velocity,
         contacts=contacts,
-        notes=("w = 0: no penetration is corrected; damping of velocities is left out.",),
+        notes=(
+            "w is gap / h where a contact is open, and 0 where it is closed: no penetration is"
+            " corrected. Damping of velocities is left out.",
+        ),
     )

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fclib.recorders import _drake, _lmgc90, _newton, _pybullet, _siconos
+from fclib.recorders import _drake, _lmgc90, _mujoco, _newton, _pybullet, _siconos
 from fclib.recorders._recorded import Recording
 
 
@@ -36,6 +36,26 @@ def _steps_of_pybullet(recording: Recording) -> Iterator[None]:
         yield
     finally:
         p.stepSimulation = original
+
+
+@contextmanager
+def _steps_of_mujoco(recording: Recording) -> Iterator[None]:
+    mj: Any = importlib.import_module("mujoco")
+    original = mj.mj_step
+
+    def step(model: Any, data: Any, nstep: int = 1) -> None:
+        for _ in range(nstep):
+            if recording.wanted:
+                recording.add(_mujoco.record(mj, model, data, original))
+            else:
+                recording.add(None)
+                original(model, data)
+
+    mj.mj_step = step
+    try:
+        yield
+    finally:
+        mj.mj_step = original
 
 
 @contextmanager
@@ -117,6 +137,7 @@ def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequ
 ENGINES: Final[dict[str, Callable[..., None]]] = {
     "drake": _in_this_process(_steps_of_drake, "pydrake"),
     "lmgc90": _lmgc90.record,
+    "mujoco": _in_this_process(_steps_of_mujoco, "mujoco"),
     "newton": _in_this_process(_steps_of_newton, "newton"),
     "pybullet": _in_this_process(_steps_of_pybullet, "pybullet"),
     "siconos": _siconos.record,

@@ -108,7 +108,8 @@ def writing(original: Any, told: Any, steps: Steps) -> Any:
                 return 0
             self.updateMu()
             if not self.getSizeOutput():
-                return 0
+                # the global problem also moves bodies that touch nothing
+                return int(original.compute(self, now))
             arrays: Any = {}
             if kept:
                 arrays, problem = told(self)

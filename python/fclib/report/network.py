@@ -25,7 +25,6 @@ their s.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,6 +35,7 @@ import scipy.sparse.csgraph
 import scipy.sparse.linalg
 
 from fclib._geometry import Bodies, Contacts
+from fclib._origin import origin_of
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -139,7 +139,7 @@ def given(bodies: Bodies, contacts: Contacts) -> Network:
 def _period_of(problem: Any) -> Array | None:
     """The periods (3) along x, y and z of the cell that a problem was simulated in."""
     try:
-        x, y = json.loads(problem.info.description.splitlines()[-1])["period"]
+        x, y = origin_of(problem.info)["period"]
         return np.array([float(x), float(y), np.inf])
     except (IndexError, KeyError, TypeError, ValueError):
         return None  # it does not tell its cell, or it has none

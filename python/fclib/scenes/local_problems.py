@@ -29,7 +29,7 @@ class LocalProblems:
 
     The hardest for the one-contact solvers of nonsmooth Gauss-Seidel in each family of the
     collection, and in bodies that spin fast, whose gyroscopic terms make W asymmetric.
-    `fclib collection choose local` finds them; `local_problems.json` holds them, to the last bit.
+    `python -m workshop.sets local` finds them; `local_problems.json` holds them, to the last bit.
 
     Beside Chute_local_problems of V. Acary, M. Bremond and O. Huber, On solving contact problems
     with Coulomb friction: formulations and numerical comparisons, 2018, which come from one family.

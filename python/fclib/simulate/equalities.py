@@ -25,7 +25,7 @@ from fclib.simulate.arrays import (
     without_zeros,
 )
 
-# benchmarks/loop_rounding.py chose these, docs/results/loop-rounding.csv has its results
+# workshop/tables/loop_rounding.py chose these, docs/results/loop-rounding.csv has its results
 RANK: Final = 1e-9  # rest of a row of length one, after the rows from which it follows
 OWN: Final = 1e-3  # a row with a larger rest is independent
 ROUNDING: Final = 2.0  # a gap may be so many units in the last place of all terms added

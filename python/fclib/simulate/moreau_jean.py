@@ -100,7 +100,7 @@ from fclib.simulate.arrays import (
 __all__ = ["Sparse", "Vector"]
 
 LONGEST = 1e9  # longest step [s]: terms in h^2 stay finite
-# benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has its results
+# workshop/tables/held_bodies.py chose these, docs/results/held-bodies.csv has its results
 ROUNDINGS = 4.0  # a closed gap may be off by so many roundings of each stored coordinate
 FACE = 16  # points of a pair that may all be corners; if there are more, the corners are found
 MOTION = 1e-3  # and by this share of each coordinate's free motion in a step

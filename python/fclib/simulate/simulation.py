@@ -13,6 +13,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fclib import _core, _geometry, _solve
+from fclib._origin import origin_of
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
@@ -485,11 +486,7 @@ def engine(scene: Scene) -> dict[str, str]:
 
 def provenance(info: _core.ProblemInfo) -> dict[str, Any]:
     """The origin of a simulated problem, from its info. ValueError if the info has none."""
-    lines = info.description.splitlines()
-    try:
-        origin = json.loads(lines[-1])
-        if origin["generator"] != "fclib.simulate":
-            raise ValueError
-    except (IndexError, KeyError, TypeError, ValueError):
-        raise ValueError(f"{info.title!r} does not say how it was simulated") from None
+    origin = origin_of(info)
+    if origin.get("generator") != "fclib.simulate":
+        raise ValueError(f"{info.title!r} does not say how it was simulated")
     return dict(origin)

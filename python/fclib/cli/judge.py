@@ -1,0 +1,119 @@
+"""``fclib judge``: how far the steps of a simulator are from Coulomb's law."""
+
+from __future__ import annotations
+
+import csv
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import fclib
+from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error
+
+SUFFIXES = (".hdf5", ".h5")
+
+
+def command(
+    what: Annotated[
+        list[str],
+        typer.Argument(
+            help="An engine and its script with arguments, as fclib record takes them; or folders"
+            " of recorded steps, one for each simulator.",
+            show_default=False,
+        ),
+    ],
+    page: Annotated[
+        Path | None, typer.Option("--out", help="Write a page with figures here.")
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write a row for each step here.")
+    ] = None,
+    every: Annotated[int, typer.Option(help="Of a script, judge one step in so many.", min=1)] = 1,
+    as_json: Json = False,
+) -> None:
+    """Judge a whole run of a simulator by Coulomb's law.
+
+    Each step with contacts is a problem. The reaction of the simulator is judged by it: Signorini's
+    condition, the cone, maximal dissipation and energy. Each criterion is relative to the step, and
+    0 for a solution. `auto` solves the same problems.
+    """
+    from fclib import recorders
+
+    if what[0] in recorders.ENGINES:
+        if len(what) < 2:
+            usage_error(ValueError(f"{what[0]}: name a script: fclib judge {what[0]} SCRIPT"))
+        with tempfile.TemporaryDirectory(prefix="fclib-judge-") as temporary:
+            folder = Path(temporary) / "steps"
+            try:
+                recorders.record_script(what[0], what[1], folder, every=every, arguments=what[2:])
+            except (ImportError, OSError, ValueError) as error:
+                fail(str(error))
+            runs = judged({Path(what[1]).stem: folder})
+    else:
+        runs = judged({one.rstrip("/"): Path(one) for one in what})
+    report = Report(as_json)
+    rows = []
+    for name, steps in runs.items():
+        rows.append({"run": name, **recorders.summary(steps)})
+        for step in steps if as_json else ():
+            report.add({"run": name, **asdict(step)})
+    try:
+        if table is not None:
+            write_table(runs, table)
+        if page is not None:
+            from fclib.report.judged import write_judged
+
+            write_judged(runs, page)
+    except ImportError as error:
+        fail(f"{error}; install it with: pip install 'fclib[report]'")
+    except OSError as error:
+        fail(str(error))
+    if as_json:
+        return
+    columns = [name for name in rows[0] if name != "run"]
+    turned: list[dict[str, Any]] = [
+        {"": name, **{row["run"]: row[name] for row in rows}} for name in columns
+    ]
+    out.print(Rows(turned))
+    out.print()
+    for name, meaning in recorders.CRITERIA.items():
+        out.print(f"{name:12}{meaning}", highlight=False)
+
+
+def judged(folders: dict[str, Path]) -> dict[str, Sequence[Any]]:
+    """The steps of each folder, judged; the command ends if there are none."""
+    from fclib import recorders
+
+    runs: dict[str, Sequence[Any]] = {}
+    for name, folder in folders.items():
+        if not folder.exists() and len(folders) == 1 and folder.suffix == "":
+            known = ", ".join(recorders.ENGINES)
+            fail(f"{folder}: is neither a folder nor an engine; there is: {known}")
+        files = [folder] if folder.is_file() else []
+        files = files or sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES)
+        if not files:
+            fail(f"{name}: there is no step with contacts")
+        steps = []
+        try:
+            with progress_bar(len(files)) as show:
+                for file, step in zip(files, recorders.judge(files), strict=True):
+                    show(file.name)
+                    steps.append(step)
+        except (fclib.Error, ValueError) as error:
+            fail(str(error))
+        runs[name] = steps
+    return runs
+
+
+def write_table(runs: dict[str, Sequence[Any]], path: Path) -> None:
+    """Write a row for each step."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        first = next(iter(runs.values()))[0]
+        writer = csv.DictWriter(file, ["run", *asdict(first)], lineterminator="\n")
+        writer.writeheader()
+        for name, steps in runs.items():
+            writer.writerows({"run": name, **asdict(step)} for step in steps)

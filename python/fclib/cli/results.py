@@ -1,0 +1,137 @@
+"""``fclib results``: published runs, which lie in files that never change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import fclib
+from fclib import bench, results
+from fclib.bench.calibration import calibration_in
+from fclib.cli._output import Json, Report, Rows, err, fail, out, words_of
+
+app = typer.Typer(help="Published runs: list, show, verify; pack your own.", no_args_is_help=True)
+
+Where = Annotated[
+    Path | None,
+    typer.Option("--in", help="Folder of the parts; by default that of the published ones."),
+]
+
+
+def folder_of(where: Path | None) -> Path:
+    """The folder of the parts; the command ends if there is none."""
+    found = where or results.folder()
+    if found is None:
+        fail("no runs are published here: pip install fclib-results, or name a folder by --in")
+    return found
+
+
+def parts_of(where: Path | None) -> list[results.Shard]:
+    """The parts; the command ends if one is damaged."""
+    try:
+        return results.shards(folder_of(where))
+    except (ImportError, fclib.Error) as error:
+        fail(str(error))
+
+
+@app.command("list")
+def list_parts(where: Where = None, as_json: Json = False) -> None:
+    """List the parts, with their runs and machines."""
+    report = Report(as_json)
+    for one in parts_of(where):
+        calibrated = [name for name, facts in one.machines.items() if calibration_in(facts)]
+        report.add(
+            {
+                "part": one.path.name,
+                "runs": one.runs,
+                "campaigns": ", ".join(dict.fromkeys(str(c.get("name")) for c in one.campaigns)),
+                "machines": ", ".join(one.machines),
+                "calibrated": len(calibrated) == len(one.machines),
+                "MB": one.path.stat().st_size / 1e6,
+            }
+        )
+    if not as_json:
+        out.print(Rows(report.records) if report.records else "no runs are published here")
+
+
+@app.command()
+def show(where: Where = None, as_json: Json = False) -> None:
+    """Show what was run: the problems, runs and solved runs of each solver at each tolerance."""
+    counts: dict[tuple[str, float], dict[str, Any]] = {}
+    problems: dict[tuple[str, float], set[str]] = {}
+    for part in parts_of(where):
+        names = ("solver", "tol", "hash", "solved", "cpu_s")
+        for row in results.rows_of(part.path, names):
+            key = row["solver"], row["tol"]
+            own = counts.setdefault(key, {"runs": 0, "solved": 0, "CPU [h]": 0.0})
+            own["runs"] += 1
+            own["solved"] += row["solved"]
+            own["CPU [h]"] += (row["cpu_s"] or 0.0) / 3600
+            problems.setdefault(key, set()).add(row["hash"])
+    report = Report(as_json)
+    for solver, tol in sorted(counts):
+        key = solver, tol
+        report.add({"solver": solver, "tol": tol, "problems": len(problems[key]), **counts[key]})
+    if not as_json:
+        out.print(Rows(report.records) if report.records else "no runs are published here")
+
+
+@app.command()
+def verify(
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Parts; by default all of the folder.")
+    ] = None,
+    where: Where = None,
+    as_json: Json = False,
+) -> None:
+    """Check the parts: their names against their contents, and each row against itself."""
+    report = Report(as_json)
+    paths = files or sorted(folder_of(where).glob("*.parquet"))
+    if not paths:
+        fail("there is no part to check")
+    for path in paths:
+        try:
+            wrong = results.verify(path)
+        except (ImportError, fclib.Error) as error:
+            wrong = [str(error)]
+        report.add({"part": str(path), "status": "wrong" if wrong else "ok"}, not wrong)
+        for word in wrong[:10]:
+            err.print(f"fclib: {path}: {word}", style="red", highlight=False)
+        if len(wrong) > 10:
+            err.print(f"fclib: {path}: {len(wrong) - 10} more", style="red")
+    if not as_json:
+        out.print(Rows(report.records))
+    raise typer.Exit(int(report.failed))
+
+
+@app.command()
+def pack(
+    store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
+    name: Annotated[str, typer.Option(help='Of the part, as "standard".')],
+    where: Where = None,
+    machine: Annotated[
+        str, typer.Option(help="Name of the machine; by default the model of its processor.")
+    ] = "",
+) -> None:
+    """Write the runs of a store that no part has yet as a new part.
+
+    The host name and the paths of the machine stay private.
+    """
+    try:
+        with bench.Store(store, create=False) as opened:
+            bare = [one for one in opened.machines().values() if calibration_in(one) is None]
+            there = results.shards(folder_of(where))
+            path = results.pack(opened, folder_of(where), name, machine, there)
+    except (ImportError, fclib.Error) as error:
+        fail(str(error))
+    except OSError as error:
+        fail(words_of(error))
+    if bare:
+        err.print(
+            "Some runs were begun before this machine was calibrated (fclib bench --calibrate):"
+            " their times cannot be put beside those of another machine",
+            highlight=False,
+        )
+    out.print(str(path) if path else "there is no new run", highlight=False)

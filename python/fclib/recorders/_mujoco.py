@@ -1,0 +1,216 @@
+"""MuJoCo: a step of its own solver, by `mj_step`.
+
+MuJoCo's contacts are soft. The problem is that of Coulomb's law at the same state, and the guess is
+what MuJoCo's solver found.
+
+The data of a step are those of its start. `mj_step` leaves them as they were, but for qpos, qvel
+and time.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fclib import _core
+from fclib.recorders._assemble import (
+    Contacts,
+    DryFriction,
+    Joints,
+    Limits,
+    Vector,
+    assemble,
+)
+from fclib.recorders._recorded import Recorded
+
+LICENCE = "Apache-2.0"
+
+
+def mujoco(model: Any, data: Any) -> Recorded:
+    """Take one step, and return its problem.
+
+    Args:
+        model: mujoco.MjModel, with the integrator Euler or implicitfast.
+        data: mujoco.MjData; it is stepped.
+
+    Raises:
+        ImportError: mujoco is not installed.
+        ValueError: the integrator is another one, or a contact is one of a flexible body.
+    """
+    module = importlib.import_module("mujoco")
+    return record(module, model, data, module.mj_step)
+
+
+def record(mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None]) -> Recorded:
+    """As `mujoco`, for the module and its stepping function."""
+    known = {
+        mj.mjtIntegrator.mjINT_EULER: "Euler",
+        mj.mjtIntegrator.mjINT_IMPLICITFAST: "implicitfast",
+    }
+    integrator = model.opt.integrator
+    if integrator not in known:
+        raise ValueError(
+            f"the integrator {mj.mjtIntegrator(integrator).name} is not recorded:"
+            ' use <option integrator="implicitfast"/> or "Euler"'
+        )
+    before, time = np.array(data.qvel), float(data.time)
+    step(model, data)
+    h, n = float(model.opt.timestep), int(model.nv)
+    M = inertia(mj, model, data)
+    if known[integrator] == "Euler":
+        disabled = model.opt.disableflags & mj.mjtDisableBit.mjDSBL_EULERDAMP
+        M += h * np.diag(np.zeros(n) if disabled else model.dof_damping)
+    else:
+        M -= h * derivative(model, data)
+        M = 0.5 * (M + M.T)
+
+    kinds = mj.mjtConstraint
+    kind, J = np.array(data.efc_type), rows_of(mj, model, data)
+    force = h * np.array(data.efc_force)
+    joints = kind == kinds.mjCNSTR_EQUALITY
+    dry = np.isin(kind, (kinds.mjCNSTR_FRICTION_DOF, kinds.mjCNSTR_FRICTION_TENDON))
+    limits = np.isin(kind, (kinds.mjCNSTR_LIMIT_JOINT, kinds.mjCNSTR_LIMIT_TENDON))
+    bound = np.array(data.efc_frictionloss)[dry]
+    contacts, reaction, twist, notes = contacts_of(mj, model, data, h)
+    v_free = before + np.linalg.solve(M, h * data.qfrc_smooth + twist)
+    assembled = assemble(
+        M,
+        v_free,
+        h,
+        contacts,
+        Joints(jacobian=J[joints]) if joints.any() else None,
+        Limits(jacobian=J[limits], w=np.maximum(data.efc_pos[limits], 0) / h)
+        if limits.any()
+        else None,
+        DryFriction(jacobian=J[dry], bound=bound) if dry.any() else None,
+    )
+    r = np.zeros((assembled.problem.nc, 3))
+    nc, end = len(contacts), len(contacts) + int(limits.sum())
+    r[:nc] = reaction
+    r[nc:end, 0] = force[limits]
+    # the bound presses dry friction
+    r[end:, 0], r[end:, 1] = h * bound, force[dry]
+    multipliers = None
+    if assembled.problem.p:
+        # multipliers of the kept rows that have the effect of all
+        kept = np.setdiff1d(np.arange(joints.sum()), assembled.redundant)
+        whole = J[joints].T @ force[joints]
+        multipliers = np.linalg.lstsq(J[joints][kept].T, whole, rcond=None)[0]
+    cone = "elliptic" if model.opt.cone == mj.mjtCone.mjCONE_ELLIPTIC else "pyramidal"
+    return Recorded(
+        assembled=assembled,
+        engine="MuJoCo",
+        version=str(mj.__version__),
+        licence=LICENCE,
+        law=f"soft contacts with {cone} friction cones, by convex optimisation",
+        time=time,
+        h=h,
+        fields={
+            "M": "exact",
+            "f": "exact",
+            "H": "exact",
+            "w": "reconstructed",
+            "mu": "exact",
+            **(dict.fromkeys(("G", "b"), "reconstructed") if assembled.problem.p else {}),
+        },
+        guess=_core.Solution(r=r.ravel(), l=multipliers),
+        velocity=np.array(data.qvel),
+        contacts=contacts,
+        notes=(
+            "w is gap / h where a contact or limit is open, and 0 where it is closed: no"
+            " penetration is corrected. Joints are rigid.",
+            *notes,
+        ),
+        more={
+            "integrator": known[integrator],
+            "body_names": [model.body(i).name or f"body {i}" for i in range(model.nbody)],
+        },
+    )
+
+
+def inertia(mj: Any, model: Any, data: Any) -> Vector:
+    """The mass matrix (n x n) of a step."""
+    M = np.zeros((model.nv, model.nv))
+    if hasattr(data, "qM"):  # before version 4
+        mj.mj_fullM(model, M, data.qM)
+    else:
+        mj.mj_fullM(model, data, M)
+    return M
+
+
+def derivative(model: Any, data: Any) -> Vector:
+    """The derivative (n x n) of the forces by the velocities, which the integrator has found."""
+    D = np.zeros((model.nv, model.nv))
+    for i in range(model.nv):
+        own = slice(model.D_rowadr[i], model.D_rowadr[i] + model.D_rownnz[i])
+        D[i, model.D_colind[own]] = data.qDeriv[own]
+    return D
+
+
+def rows_of(mj: Any, model: Any, data: Any) -> Vector:
+    """The rows of the constraints (nefc x n) of MuJoCo's solver."""
+    shape = (int(data.nefc), int(model.nv))
+    if not mj.mj_isSparse(model):
+        return np.reshape(data.efc_J, shape).copy()
+    J = np.zeros(shape)
+    for i in range(shape[0]):
+        own = slice(data.efc_J_rowadr[i], data.efc_J_rowadr[i] + data.efc_J_rownnz[i])
+        J[i, np.ravel(data.efc_J_colind)[own]] = np.ravel(data.efc_J)[own]
+    return J
+
+
+def contacts_of(
+    mj: Any, model: Any, data: Any, h: float
+) -> tuple[Contacts, Vector, Vector, list[str]]:
+    """The contacts on which the solver worked, and what it found for them.
+
+    Returns:
+        contacts, impulses (nc x 3) [N s], the generalised impulse (n) of the moments of torsional
+        and rolling friction, and what is left out.
+    """
+    found = [data.contact[k] for k in range(data.ncon)]
+    active = [k for k, one in enumerate(found) if one.exclude == 0]
+    rows, pairs, r = [], [], []
+    twist = np.zeros(model.nv)
+    mu, notes = np.zeros(len(active)), set()
+    for i, k in enumerate(active):
+        one = found[k]
+        geoms = np.array(one.geom)
+        if (geoms < 0).any():
+            raise ValueError(f"contact {k}: is one of a flexible body, which is not recorded")
+        bodies = model.geom_bodyid[geoms]
+        frame = np.reshape(one.frame, (3, 3))
+        J, spin = np.zeros((2, 3, model.nv)), np.zeros((2, 3, model.nv))
+        for own, turn, body in zip(J, spin, bodies, strict=True):
+            mj.mj_jac(model, data, own, turn, one.pos, body)
+        rows.append(frame @ (J[1] - J[0]))
+        pairs.append(bodies)
+        force = np.zeros(6)
+        mj.mj_contactForce(model, data, k, force)
+        r.append(h * force[:3])
+        if one.dim > 1:
+            mu[i] = one.friction[0]
+            if one.friction[0] != one.friction[1]:
+                notes.add("Friction differs along the tangents: the first coefficient is taken.")
+        if one.dim > 3:
+            twist += h * (frame @ (spin[1] - spin[0])).T @ force[3:]
+            notes.add("The moments of torsional and rolling friction are MuJoCo's, a part of f.")
+        if np.any(getattr(one, "surfacevel", 0)):
+            notes.add("Moving surfaces are left out.")
+    nc = len(active)
+    gap = np.array([found[k].dist for k in active])
+    w = np.zeros((nc, 3))
+    w[:, 0] = np.maximum(gap, 0) / h
+    contacts = Contacts(
+        jacobian=np.reshape(rows, (3 * nc, model.nv)),
+        mu=mu,
+        w=w.ravel(),
+        point=np.reshape([found[k].pos for k in active], (nc, 3)),
+        frame=np.reshape([found[k].frame for k in active], (nc, 3, 3)),
+        bodies=np.reshape(pairs, (nc, 2)).astype(np.int64),
+        gap=gap,
+    )
+    return contacts, np.reshape(r, (nc, 3)), twist, sorted(notes)

@@ -1,0 +1,135 @@
+"""Published runs beside those of a store, with times on the scale of its machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from fclib import _core
+from fclib.bench.calibration import Calibration, Ratio, calibration_in, ratio_of
+from fclib.bench.store import Store
+from fclib.results.shards import ShardError, look, rows_of
+
+TIMES = ("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s")
+REMEDY = "calibrate this machine with `fclib bench --calibrate`, before the campaign"
+
+
+class BesideError(_core.Error, ValueError):
+    """Published runs cannot be put beside a store."""
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A store with published runs beside its own."""
+
+    path: Path  # of the store
+    runs: int  # published ones
+    ratios: Mapping[str, Ratio]  # factor of the times of each published machine
+
+    def __str__(self) -> str:
+        words = [f"times of {node} x {ratio}" for node, ratio in self.ratios.items()]
+        return f"{self.runs} published runs; {'; '.join(words) or 'of this machine'}"
+
+
+@contextmanager
+def beside(
+    mine: Path, parts: Iterable[Path], machine: str | None = None, *, scale: bool = True
+) -> Iterator[Joined]:
+    """A temporary store with the runs of a store, and the published ones of the same problems.
+
+    The published runs of a problem at a tolerance, under a limit, are taken if the store has a run
+    of this kind. A time on another machine becomes the time on this one: it is multiplied by the
+    ratio of the two calibrations. A run that would take longer than its limit here has failed.
+
+    Args:
+        mine: the store.
+        parts: files of published runs.
+        machine: the node whose runs of the store count; it may be left out if there is one.
+        scale: whether times are multiplied. Without it they are as they were measured.
+
+    Raises:
+        BesideError: a machine was not calibrated, there are several, or there is nothing to take.
+        ShardError: a part cannot be read.
+    """
+    with TemporaryDirectory(prefix="fclib-results-") as temporary:
+        path = Path(temporary) / mine.name
+        with Store(path) as joined:
+            joined.merge([mine])
+            own = joined.machines()
+            wanted, node, facts = _wanted(joined, own, machine, mine)
+            here = calibration_in(facts)
+            ratios: dict[str, Ratio] = {}
+            taken = 0
+            for part in parts:
+                machines = look(part).machines
+                if scale:
+                    ratios |= _ratios(here, machines, facts, part)
+                rows = (
+                    _scaled(row, ratios.get(row["node"]), node)
+                    for row in rows_of(part)
+                    if kind_of(row) in wanted
+                )
+                taken += joined.add_rows(rows, {node: facts})
+        if not taken:
+            raise BesideError(
+                f"{mine}: no published run has a problem, tolerance and limits of this store"
+            )
+        yield Joined(path, taken, {k: v for k, v in ratios.items() if v.mean != 1})
+
+
+def kind_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What two runs have in common that may be compared."""
+    names = ("hash", "tol", "merit", "time_limit", "start", "sequence", "step", "threads")
+    return tuple(row[name] for name in names)
+
+
+def _wanted(
+    store: Store, machines: Mapping[str, Mapping[str, Any]], machine: str | None, mine: Path
+) -> tuple[set[tuple[Any, ...]], str, Mapping[str, Any]]:
+    """The kinds of the runs of a machine, its node, and its facts."""
+    runs = list(store.table())
+    nodes = sorted({str(row["node"]) for row in runs})
+    node = machine or (nodes[0] if len(nodes) == 1 else "")
+    if node not in nodes:
+        what = f"has no run of {node}" if machine else "has runs of several machines"
+        raise BesideError(f"{mine}: {what}; choose one by --machine: {', '.join(nodes)}")
+    own = [row for row in runs if row["node"] == node]
+    known = [machines[row["machine"]] for row in own]
+    # a machine that was calibrated later is the same machine
+    facts = next((one for one in reversed(known) if calibration_in(one)), known[0])
+    return {kind_of(row) for row in own}, node, facts
+
+
+def _ratios(
+    here: Calibration | None,
+    machines: Mapping[str, Mapping[str, Any]],
+    facts: Mapping[str, Any],
+    part: Path,
+) -> dict[str, Ratio]:
+    """The factor of the times of each machine of a part."""
+    found = {}
+    for name, theirs in machines.items():
+        other = calibration_in(theirs)
+        if here is None:
+            raise BesideError(f"the machine of the store was not calibrated: {REMEDY}")
+        if other is None:
+            raise ShardError(f"{part}: the machine {name} was not calibrated")
+        try:
+            found[name] = ratio_of(here, other)
+        except ValueError as error:
+            raise BesideError(f"{part}: {error}; {REMEDY}") from None
+    return found
+
+
+def _scaled(row: Mapping[str, Any], ratio: Ratio | None, node: str) -> dict[str, Any]:
+    """A published run as one of this machine."""
+    factor = 1.0 if ratio is None else ratio.mean
+    times = {name: None if row[name] is None else factor * row[name] for name in TIMES}
+    here = {**row, **times, "node": node}
+    if row["solved"] and (here["cpu_s"] or 0.0) > row["time_limit"]:
+        return here | {"status": "time_limit", "solved": 0}
+    return here

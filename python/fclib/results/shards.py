@@ -1,0 +1,243 @@
+"""A part of the published runs: a file that is written once, and named by its content.
+
+It is a Parquet file with a row for each run and the columns of a store's `results`, so that any
+program reads it. Paths of the machine, and solutions, stay out of it. Its metadata have the facts
+of the machines, with their calibrations, and the texts of the campaigns.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from fclib import _core
+from fclib._verdicts import is_solved
+from fclib.bench.layout import CAMPAIGN, HISTORY
+from fclib.bench.store import LONG, Store
+from fclib.bench.table import TEXTS, WHOLE
+from fclib.collections.catalog import arrow, replace_file, sha256
+
+PACKAGE: Final = "fclib_results"
+IN_PLACE: Final = Path(__file__).resolve().parents[3] / "results" / PACKAGE
+FOLDER: Final = "runs"
+ABOUT: Final = b"fclib.results"  # key of the metadata
+VERSION: Final = 1
+DIGITS: Final = 16  # digits of the file's SHA-256 in its name
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
+LEFT: Final = ("run", "campaign", "machine")  # columns of a store that mean nothing elsewhere
+OF_A_MACHINE: Final = ("node", "cpu", "cores")
+# what may name a person's machine
+PRIVATE: Final = ("node", "system")
+
+
+class ShardError(_core.Error, ValueError):
+    """A file is no part of published runs, or is damaged."""
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A part, and what its metadata say."""
+
+    path: Path
+    name: str
+    runs: int
+    machines: Mapping[str, Mapping[str, Any]]  # facts by the name of the machine
+    campaigns: Sequence[Mapping[str, Any]]
+
+    @property
+    def digest(self) -> str:
+        """The digits of its content that its name has."""
+        found = PART.fullmatch(self.path.name)
+        return found[2] if found else ""
+
+
+def folder() -> Path | None:
+    """The folder of the published parts; None if there is none."""
+    if IN_PLACE.is_dir():
+        return IN_PLACE / FOLDER
+    spec = importlib.util.find_spec(PACKAGE)
+    return Path(spec.origin).parent / FOLDER if spec is not None and spec.origin else None
+
+
+def shards(where: Path) -> list[Shard]:
+    """The parts of a folder, by their names. ShardError if one is damaged; ImportError."""
+    return [look(path) for path in sorted(where.glob("*.parquet"))]
+
+
+def look(path: Path) -> Shard:
+    """What the metadata of a part say.
+
+    Raises:
+        ShardError: it is no part.
+        ImportError: pyarrow is missing.
+    """
+    pa = arrow()
+    try:
+        file = pa.parquet.ParquetFile(path)
+        about = json.loads((file.schema_arrow.metadata or {})[ABOUT])
+        found = PART.fullmatch(path.name)
+        name = found[1] if found else path.stem
+        if about["version"] != VERSION:
+            raise ShardError(f"{path}: is of version {about['version']}, and {VERSION} is read")
+        machines = {str(key): dict(value) for key, value in about["machines"].items()}
+        campaigns = [dict(one) for one in about["campaigns"]]
+        return Shard(path, name, file.metadata.num_rows, machines, campaigns)
+    except (OSError, pa.ArrowException) as error:
+        reason = str(error).splitlines()[0]
+        raise ShardError(f"{path}: cannot be read as published runs: {reason}") from None
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        if isinstance(error, ShardError):
+            raise
+        raise ShardError(f"{path}: is no part of published runs") from None
+
+
+def pack(
+    store: Store,
+    where: Path,
+    name: str,
+    machine: str = "",
+    there: Iterable[Shard] = (),
+) -> Path | None:
+    """Write the runs of a store that no part has yet as a new part.
+
+    Args:
+        store: its damaged rows are left out.
+        where: folder of the parts.
+        name: of the part, as "standard".
+        machine: the name under which the machine is published; its host name stays private. By
+            default the model of its processor.
+        there: parts whose runs are not packed again.
+
+    Returns:
+        The file; None if there is no new run.
+
+    Raises:
+        ShardError: the name is none, or the runs are of several machines.
+        ImportError: pyarrow is missing.
+    """
+    if not NAME.fullmatch(name):
+        raise ShardError(f"{name!r}: is no name of a part: use letters, digits, . _ -")
+    pa = arrow()
+    known = {
+        (row["key"], row["node"]) for one in there for row in rows_of(one.path, ("key", "node"))
+    }
+    own = store.machines()
+    nodes = sorted({str(facts.get("node")) for facts in own.values()})
+    if machine and len(nodes) > 1:
+        raise ShardError(
+            f"{store.path}: has runs of {len(nodes)} machines, which need a name each: pack the"
+            " store of each machine"
+        )
+    public = {key: machine or str(facts.get("cpu") or "?") for key, facts in own.items()}
+    kinds = store.kinds()
+    rows = []
+    for row in store.table(more=LONG):
+        label = public[row["machine"]]
+        if (row["key"], label) in known:
+            continue
+        history = [dict(zip(HISTORY, report, strict=True)) for report in store.history(row["run"])]
+        mine = {key: value for key, value in row.items() if key not in LEFT}
+        rows.append(
+            mine | {"node": label, "kind": kinds.get(row["hash"], ""), "history": history or None}
+        )
+    if not rows:
+        return None
+    machines = {
+        public[key]: {k: v for k, v in facts.items() if k not in PRIVATE}
+        for key, facts in own.items()
+    }
+    campaigns = [
+        {key: one[key] for key in CAMPAIGN if key not in ("pid", "node", "seen")}
+        for one in store.campaigns()
+    ]
+    about = {"version": VERSION, "machines": machines, "campaigns": campaigns}
+    table = pa.Table.from_pylist(rows, schema=schema(pa, rows[0], about))
+    where.mkdir(parents=True, exist_ok=True)
+    part = where / f".{name}.part"
+    replace_file(part, lambda beside: pa.parquet.write_table(table, beside, compression="zstd"))
+    path = where / f"{name}-{sha256(part)[:DIGITS]}.parquet"
+    part.replace(path)
+    return path
+
+
+def schema(pa: Any, row: Mapping[str, Any], about: Mapping[str, Any]) -> Any:
+    """The columns of a part."""
+    report = pa.struct(
+        [
+            ("iteration", pa.int64()),
+            ("error", pa.float64()),
+            ("time", pa.float64()),
+            ("stage", pa.string()),
+        ]
+    )
+    types = {
+        name: pa.string()
+        if name in TEXTS or name == "kind"
+        else pa.int64()
+        if name in WHOLE
+        else pa.float64()
+        for name in row
+    }
+    types["history"] = pa.list_(report)
+    metadata = {ABOUT: json.dumps(about, sort_keys=True)}
+    return pa.schema(list(types.items()), metadata=metadata)
+
+
+def rows_of(path: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+    """The rows of a part, one after another. ShardError if one cannot be read."""
+    pa = arrow()
+    try:
+        file = pa.parquet.ParquetFile(path)
+        for batch in file.iter_batches(columns=list(columns) if columns else None):
+            yield from batch.to_pylist()
+    except (OSError, pa.ArrowException) as error:
+        reason = str(error).splitlines()[0]
+        raise ShardError(f"{path}: cannot be read as published runs: {reason}") from None
+
+
+def verify(path: Path) -> list[str]:
+    """What is wrong with a part: its name, its rows, and what they say; empty if nothing is.
+
+    Raises:
+        ShardError: it cannot be read at all.
+    """
+    found = PART.fullmatch(path.name)
+    wrong = []
+    if found is None:
+        wrong.append("the name is not NAME-DIGEST.parquet")
+    elif sha256(path)[:DIGITS] != found[2]:
+        wrong.append(f"the content is {sha256(path)[:DIGITS]}, and the name says {found[2]}")
+    own = look(path)
+    keys: set[tuple[str, str]] = set()
+    for number, row in enumerate(rows_of(path)):
+        where = f"row {number}"
+        key = row.get("key"), row.get("node")
+        if key in keys:
+            wrong.append(f"{where}: the run {key[0]} is there twice")
+        keys.add(key)  # type: ignore[arg-type]
+        if row.get("node") not in own.machines:
+            wrong.append(f"{where}: is of a machine that the metadata lack: {row.get('node')}")
+        wrong += [f"{where}: {word}" for word in contradictions(row)]
+    return wrong
+
+
+def contradictions(row: Mapping[str, Any]) -> list[str]:
+    """What contradicts itself in a run."""
+    wrong = []
+    error, tol = row["error"], row["tol"]
+    if row["status"] == "converged" and not (error is not None and error <= tol):
+        wrong.append(f"is converged, and its error {error} is not within {tol}")
+    if bool(row["solved"]) != is_solved(row["status"]):
+        wrong.append(f"has the status {row['status']}, and solved is {row['solved']}")
+    for name in ("cpu_s", "wall_s", "total_cpu_s"):
+        value = row[name]
+        if value is not None and not (0 <= value < math.inf):
+            wrong.append(f"{name} is {value}")
+    return wrong

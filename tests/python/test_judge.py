@@ -1,0 +1,138 @@
+"""The judgement of whole runs of simulators: planted defects show in their own criterion."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fclib
+from fclib import recorders
+from fclib.cli import app
+from helpers import planted_global, planted_local
+
+
+def block(mu: float = 0.5, sideways: float = 0.2) -> Any:
+    """A block of 2 kg on a plane, which slides: q = (-0.1, sideways, 0) m/s."""
+    return fclib.LocalProblem(
+        spacedim=3, W=0.5 * np.eye(3), q=np.array([-0.1, sideways, 0.0]), mu=np.array([mu])
+    )
+
+
+RIGHT = np.array([0.2, -0.1, 0.0])  # of the block
+
+
+def test_a_solution_is_zero_in_all_criteria() -> None:
+    for seed in range(20):
+        for planted in (planted_local(seed), planted_global(seed)):
+            found = recorders.criteria_of(planted.problem, planted.solution)
+            assert found.keys() == recorders.CRITERIA.keys()
+            assert max(found.values()) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("r", "shown", "hidden"),
+    [
+        ([0.1, -0.05, 0], {"penetration": 0.05 / math.hypot(0.1, 0.2)}, ("tension", "cone")),
+        ([-0.1, 0.05, 0], {"tension": 1.0}, ("distance",)),
+        (
+            [0.4, -0.2, 0],
+            {"distance": 0.4 * 0.1 / (math.hypot(0.1, 0.2) * math.hypot(0.4, 0.2))},
+            (),
+        ),
+        ([0.2, -0.3, 0], {"cone": 2.0}, ("penetration", "tension", "distance")),
+        (
+            [0.2, 0, 0],
+            {"dissipation": 0.5 * 0.2 * 0.2 / (math.hypot(0.1, 0.2) * 0.5 * 0.2)},
+            ("penetration", "tension", "cone", "distance"),
+        ),
+        # against the law of dissipation: friction pushes, and energy comes in
+        ([0.2, 0.1, 0], {"energy": 0.1 * 0.25 / (math.hypot(0.1, 0.2) * math.hypot(0.2, 0.1))}, ()),
+    ],
+)
+def test_a_defect_shows_in_its_criterion(
+    r: list[float], shown: dict[str, float], hidden: tuple[str, ...]
+) -> None:
+    found = recorders.criteria_of(block(), fclib.Solution(r=np.array(r, dtype=float)))
+    for name, value in shown.items():
+        assert found[name] == pytest.approx(value, rel=1e-12)
+    for name in hidden:
+        assert found[name] < 1e-15
+    assert found["error"] > 1e-2
+
+
+def test_criteria_do_not_depend_on_units() -> None:
+    """Velocities in mm/s, impulses in N s: the same numbers."""
+    problem, r = block(), fclib.Solution(r=np.array([0.3, 0.05, 0.1]))
+    scaled = problem.replace(W=np.asarray(problem.W) * 1e3, q=np.asarray(problem.q) * 1e3)
+    first, second = (recorders.criteria_of(one, r) for one in (problem, scaled))
+    for name in set(first) - {"error"}:
+        assert first[name] == pytest.approx(second[name], rel=1e-12), name
+
+
+def test_what_cannot_be_judged_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="2 numbers, and the problem has 3"):
+        recorders.criteria_of(block(), fclib.Solution(r=np.zeros(2)))
+    fclib.write(tmp_path / "one.hdf5", block())
+    with pytest.raises(fclib.FileError, match=r"one\.hdf5: has no guess"):
+        list(recorders.judge([tmp_path / "one.hdf5"]))
+    for words, status, said in (
+        ([str(tmp_path)], 1, "has no guess"),
+        (["mujocoo", "script.py"], 1, "mujocoo"),
+        ([str(tmp_path / "none")], 1, "neither a folder nor an engine"),
+        (["mujoco"], 2, "name a script"),
+        (["mujoco", str(tmp_path / "none.py")], 1, "there is no such script"),
+    ):
+        done = CliRunner().invoke(app, ["judge", *words])
+        assert done.exit_code == status, done.output
+        assert said in done.output
+
+
+def test_runs_are_judged_side_by_side(tmp_path: Path) -> None:
+    """Two simulators on one scene: one that is right, and one whose friction is too large."""
+    for name, r in (("right", RIGHT), ("wrong", np.array([0.2, -0.3, 0.0]))):
+        folder = tmp_path / name
+        folder.mkdir()
+        for k in range(5):
+            fclib.write(folder / f"{k}.hdf5", block(), None, [fclib.Solution(r=r)])
+    page, table = tmp_path / "page.html", tmp_path / "steps.csv"
+    words = ["judge", str(tmp_path / "right"), str(tmp_path / "wrong")]
+    done = CliRunner().invoke(app, [*words, "--csv", str(table)])
+    assert done.exit_code == 0, done.output
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 10
+    assert [float(row["cone"]) for row in rows] == pytest.approx([0.0] * 5 + [2.0] * 5)
+    assert {row["auto_status"] for row in rows} == {"converged"}
+    done = CliRunner().invoke(app, [*words, "--json"])
+    found = [json.loads(line) for line in done.output.splitlines()]
+    assert [one["error"] < 1e-12 for one in found] == [True] * 5 + [False] * 5
+    pytest.importorskip("plotly")
+    done = CliRunner().invoke(app, [*words, "--out", str(page)])
+    assert done.exit_code == 0, done.output
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<h2>") == len(recorders.CRITERIA)
+    assert "<script src" not in text  # the page needs no other file
+
+
+def test_a_script_is_judged(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    script = tmp_path / "slide.py"
+    script.write_text(
+        "import mujoco\n"
+        "model = mujoco.MjModel.from_xml_string(\n"
+        "    \"<mujoco><worldbody><geom type='plane' size='5 5 1'/><body pos='0 0 .0999'>\"\n"
+        "    \"<freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody></mujoco>\")\n"
+        "data = mujoco.MjData(model)\n"
+        "for _ in range(20):\n    mujoco.mj_step(model, data)\n"
+    )
+    done = CliRunner().invoke(app, ["judge", "mujoco", str(script), "--every", "4"])
+    assert done.exit_code == 0, done.output
+    assert "slide" in done.output
+    assert "dissipation" in done.output

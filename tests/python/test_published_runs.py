@@ -1,0 +1,309 @@
+"""Published runs: packed and read back, checked, and put beside a store of another machine."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from fclib import bench
+from fclib.bench import calibration, machine
+from fclib.bench.calibration import Calibration, calibration_in, ratio_of
+from fclib.bench.job import Job, Record
+from fclib.cli import app
+
+pytest.importorskip("pyarrow")
+
+from fclib import results
+
+PLAN = {
+    "name": "small",
+    "solvers": ["nsgs", "apgd"],
+    "tolerances": [1e-4, 1e-8],
+    "problems": [{"planted": {"count": 4, "contacts": 5, "seed": 1}, "family": "planted"}],
+}
+SECONDS = {f"solve {k}": 1e-3 * 2**k for k in range(6)}
+CALIBRATED = Calibration(calibration.VERSION, "2026-01-01", 0.1, SECONDS, 0.01)
+
+
+def facts(node: str, speed: float | None) -> dict[str, Any]:
+    """The facts of a machine that is so much slower than CALIBRATED; None: not calibrated."""
+    own: dict[str, Any] = {"node": node, "cpu": "some processor", "cores": 2, "memory_gb": 8.0}
+    if speed is not None:
+        seconds = {name: speed * value for name, value in SECONDS.items()}
+        own["calibration"] = replace(CALIBRATED, seconds=seconds).record()
+    return own
+
+
+def store(path: Path, own: dict[str, Any], solvers: list[str], cpu: float = 0.01) -> Path:
+    """A store of runs that were not run."""
+    campaign = bench.Campaign.of({**PLAN, "solvers": solvers})
+    with bench.Store(path) as opened:
+        number = opened.begin("small", "text", 1, 0, own["node"])
+        runs: list[tuple[Job, Record]] = [
+            (
+                job,
+                Record(
+                    "converged",
+                    "",
+                    iterations=7,
+                    cpu_s=cpu,
+                    wall_s=cpu,
+                    total_cpu_s=cpu,
+                    merits={"error": job.tol / 2, "natural": job.tol / 3},
+                    machine=own,
+                    history=[(0, 1.0, 0.0, ""), (7, job.tol / 2, cpu, "newton")],
+                    started=1.7e9,
+                ),
+            )
+            for job in campaign.plan()
+        ]
+        opened.add_all(runs, number)
+        opened.alive(number, ended=True)
+    return path
+
+
+def packed(tmp_path: Path, node: str = "theirs", speed: float | None = 2.0, **more: Any) -> Path:
+    """The published runs of another machine."""
+    path = store(tmp_path / "theirs.sqlite", facts(node, speed), ["nsgs", "apgd"], **more)
+    with bench.Store(path) as opened:
+        found = results.pack(opened, tmp_path / "parts", "small", "fast")
+    assert found is not None
+    return found
+
+
+# ---- a part
+
+
+def test_a_part_holds_the_runs_and_no_name_of_the_machine(tmp_path: Path) -> None:
+    part = packed(tmp_path, node="secret-host")
+    assert results.verify(part) == []
+    (found,) = results.shards(tmp_path / "parts")
+    assert (found.name, found.runs, list(found.machines)) == ("small", 16, ["fast"])
+    assert found.digest in part.name
+    assert [one["name"] for one in found.campaigns] == ["small"]
+    rows = list(results.rows_of(part))
+    assert {row["solver"] for row in rows} == {"nsgs", "apgd"}
+    assert all(row["history"][1]["stage"] == "newton" for row in rows)
+    assert b"secret-host" not in part.read_bytes()
+    assert str(tmp_path).encode() not in part.read_bytes()
+    assert "secret-host" not in json.dumps([rows, dict(found.machines)])
+
+
+def test_what_is_packed_comes_back(tmp_path: Path) -> None:
+    part = packed(tmp_path)
+    (own,) = results.shards(tmp_path / "parts")
+    with (
+        bench.Store(tmp_path / "back.sqlite") as back,
+        bench.Store(tmp_path / "theirs.sqlite") as old,
+    ):
+        assert back.add_rows(results.rows_of(part), own.machines) == 16
+        assert back.add_rows(results.rows_of(part), own.machines) == 0
+        hidden = {"run", "campaign", "machine", "node"}
+        first, second = (
+            sorted(
+                json.dumps({k: v for k, v in row.items() if k not in hidden}, sort_keys=True)
+                for row in one.table(more=("key", "message", "stages"))
+            )
+            for one in (old, back)
+        )
+        assert first == second
+        assert back.history(1) == old.history(1)
+        assert back.mend() == 0
+
+
+def test_a_part_is_never_written_twice(tmp_path: Path) -> None:
+    first = packed(tmp_path)
+    before = first.read_bytes()
+    with bench.Store(tmp_path / "theirs.sqlite") as opened:
+        there = results.shards(tmp_path / "parts")
+        assert results.pack(opened, tmp_path / "parts", "small", "fast", there) is None
+    store(tmp_path / "theirs.sqlite", facts("theirs", 2.0), ["ppa-nsn"])
+    with bench.Store(tmp_path / "theirs.sqlite") as opened:
+        second = results.pack(opened, tmp_path / "parts", "small", "fast", there)
+    assert second is not None
+    assert second != first
+    assert first.read_bytes() == before
+    assert {row["solver"] for row in results.rows_of(second)} == {"ppa-nsn"}
+
+
+def test_a_part_that_was_changed_is_found(tmp_path: Path) -> None:
+    part = packed(tmp_path)
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    with pytest.raises(results.ShardError, match=r"the content is|cannot be read"):
+        raise results.ShardError(results.verify(part)[0])
+    for name, content in (("no.parquet", b"PAR1 and no more PAR1"), ("empty.parquet", b"")):
+        other = tmp_path / name
+        other.write_bytes(content)
+        with pytest.raises(results.ShardError, match="cannot be read"):
+            results.verify(other)
+
+
+def test_rows_that_contradict_themselves_are_found(tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    part = packed(tmp_path)
+    table = pq.read_table(part)
+    rows = table.to_pylist()
+    rows[0]["error"] = 1.0
+    rows[1]["solved"] = 0
+    rows[2]["cpu_s"] = math.nan
+    rows[3] = dict(rows[4])
+    wrong = tmp_path / part.name
+    pq.write_table(type(table).from_pylist(rows, schema=table.schema), wrong)
+    said = "\n".join(results.verify(wrong))
+    for word in ("row 0: is converged", "row 1: has the status", "row 2: cpu_s", "there twice"):
+        assert word in said
+
+
+# ---- beside
+
+
+def test_times_come_to_the_scale_of_this_machine(tmp_path: Path) -> None:
+    """Theirs is twice as slow: their 10 ms are 5 ms here; what I ran myself stays."""
+    part = packed(tmp_path, speed=2.0)
+    mine = store(tmp_path / "mine.sqlite", facts("mine", 1.0), ["nsgs"], cpu=0.004)
+    with results.beside(mine, [part]) as found:
+        assert found.runs == 8  # of apgd; nsgs is there already
+        assert found.ratios["fast"].mean == pytest.approx(0.5)
+        with bench.Store(found.path, create=False) as opened:
+            rows = list(opened.table())
+    cpu = {row["solver"]: row["cpu_s"] for row in rows}
+    assert cpu == {"nsgs": pytest.approx(0.004), "apgd": pytest.approx(0.005)}
+    assert {row["node"] for row in rows} == {"mine"}
+    with results.beside(mine, [part], scale=False) as found, bench.Store(found.path) as opened:
+        assert max(row["cpu_s"] for row in opened.table()) == pytest.approx(0.01)
+    assert not found.path.exists()
+
+
+def test_a_run_that_would_be_too_slow_here_has_failed(tmp_path: Path) -> None:
+    part = packed(tmp_path, speed=1.0, cpu=8.0)  # of 10 s
+    mine = store(tmp_path / "mine.sqlite", facts("mine", 2.0), ["ppa-nsn"])
+    with results.beside(mine, [part]) as found, bench.Store(found.path) as opened:
+        rows = [row for row in opened.table() if row["solver"] == "apgd"]
+    assert {(row["status"], row["solved"], row["cpu_s"]) for row in rows} == {
+        ("time_limit", 0, 16.0)
+    }
+
+
+def test_what_cannot_be_compared_is_named(tmp_path: Path) -> None:
+    part = packed(tmp_path)
+    plain = store(tmp_path / "plain.sqlite", facts("mine", None), ["nsgs"])
+    with pytest.raises(results.BesideError, match="--calibrate"), results.beside(plain, [part]):
+        pass
+    mine = store(tmp_path / "mine.sqlite", facts("mine", 1.0), ["nsgs"])
+    (tmp_path / "bare").mkdir()
+    bare = packed(tmp_path / "bare", speed=None)
+    with (
+        pytest.raises(results.ShardError, match="fast was not calibrated"),
+        results.beside(mine, [bare]),
+    ):
+        pass
+    store(mine, facts("other", 1.0), ["apgd"])
+    with pytest.raises(results.BesideError, match="several machines"), results.beside(mine, [part]):
+        pass
+    with results.beside(mine, [part], "mine") as found:
+        assert found.runs > 0
+
+
+def test_the_interval_of_a_ratio_covers_it() -> None:
+    """Noise of 5 % in each solve: the interval has the ratio in 90 to 100 of 100 cases."""
+    rng = np.random.default_rng(0)
+    covered = 0
+    for _ in range(200):
+        noisy = [
+            {name: value * speed * math.exp(rng.normal(0, 0.05)) for name, value in SECONDS.items()}
+            for speed in (3.0, 1.0)
+        ]
+        found = ratio_of(*(replace(CALIBRATED, seconds=own) for own in noisy))
+        covered += found.low <= 3.0 <= found.high
+    assert 180 <= covered <= 200
+    with pytest.raises(ValueError, match="do not compare"):
+        ratio_of(CALIBRATED, replace(CALIBRATED, version=0))
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        {},
+        {"calibration": 3},
+        {"calibration": {"seconds": {}}},
+        {"calibration": {"seconds": {"a": 0}}},
+    ],
+)
+def test_facts_without_a_calibration_have_none(known: dict[str, Any]) -> None:
+    assert calibration_in(known) is None
+
+
+# ---- the commands
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))
+    machine.facts.cache_clear()
+    yield tmp_path / "cache"
+    machine.facts.cache_clear()
+
+
+def test_this_machine_is_calibrated_once(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration, "SECONDS", 0.1)
+    monkeypatch.setattr(calibration, "SIZES", (3, 30))
+    assert "calibration" not in machine.facts()
+    found = calibration.calibrate(0.1)
+    path = calibration.save(found)
+    assert path.parent == own_cache
+    assert calibration_in(machine.facts()) == found
+    assert ratio_of(found, found).mean == 1
+    path.write_text("no JSON")
+    machine.facts.cache_clear()
+    assert calibration_in(machine.facts()) is None
+
+
+def test_the_commands(tmp_path: Path) -> None:
+    store(tmp_path / "theirs.sqlite", facts("theirs", 2.0), ["nsgs", "apgd"])
+    mine = store(tmp_path / "mine.sqlite", facts("mine", 1.0), ["ppa-nsn"])
+    parts = tmp_path / "parts"
+
+    def said(*words: object, code: int = 0) -> str:
+        done = CliRunner().invoke(app, [str(word) for word in words])
+        assert done.exit_code == code, done.output
+        return done.output
+
+    options = ("--name", "small", "--in", parts, "--machine", "fast")
+    part = said("results", "pack", tmp_path / "theirs.sqlite", *options).strip()
+    assert "there is no new run" in said("results", "pack", tmp_path / "theirs.sqlite", *options)
+    assert "fast" in said("results", "list", "--in", parts)
+    shown = [
+        json.loads(line) for line in said("results", "show", "--in", parts, "--json").splitlines()
+    ]
+    assert [(row["solver"], row["tol"], row["solved"]) for row in shown] == [
+        *(("apgd", tol, 4) for tol in (1e-8, 1e-4)),
+        *(("nsgs", tol, 4) for tol in (1e-8, 1e-4)),
+    ]
+    assert "ok" in said("results", "verify", "--in", parts)
+    text = said("profile", mine, "--with", part)
+    assert "16 published runs; times of fast x 0.5" in " ".join(text.split())
+    for name in ("nsgs", "apgd", "ppa-nsn"):
+        assert name in text
+    assert "nsgs" not in said("profile", mine)
+    assert "--calibrate" in said(
+        "profile",
+        store(tmp_path / "bare.sqlite", facts("b", None), ["nsgs"]),
+        "--with",
+        part,
+        code=1,
+    )
+    shutil.rmtree(parts)
+    parts.mkdir()
+    assert "no part" in said("results", "verify", "--in", parts, code=1)

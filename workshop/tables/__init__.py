@@ -1,0 +1,1 @@
+"""What makes the tables of docs/results/: measurements that no campaign can do, and campaigns."""

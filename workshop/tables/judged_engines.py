@@ -1,0 +1,311 @@
+"""How far engines are from Coulomb's law, each on the same scenes, beside our own steps.
+
+    PYTHON -m workshop.tables.judged_engines [--scene slide ...] [--steps 500] [--page FILE]
+        [--results judged-engines]
+
+PYTHON has fclib, MuJoCo, Drake, Newton and PyBullet; Siconos has an interpreter of its own
+(fclib.external.siconos). Engines that are not installed are left out, and said. Each engine has its
+default settings, but for the scene, the time step of 2 ms, Coulomb's coefficient and the damping of
+velocities, which is 0. The criteria are those of `fclib judge`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import fclib
+from fclib import recorders
+from workshop.tables import _results
+
+H = 2e-3  # [s]
+STEPS = 500
+MU = 0.5
+KEPT = 5  # one step in so many is judged
+SICONOS = Path(__file__).with_name("_siconos_judged.py")
+
+
+@dataclass(frozen=True)
+class Box:
+    """A free box."""
+
+    half: tuple[float, float, float]  # [m]
+    mass: float  # [kg]
+    place: tuple[float, float, float]  # of its centre at the start [m]
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m/s]
+
+
+CUBE = (0.1, 0.1, 0.1)
+SCENES = {
+    "slide": [Box(CUBE, 2.0, (0, 0, 0.1), (2.0, 0, 0))],
+    "stack": [Box(CUBE, 1.0 + i, (0, 0, 0.1 + 0.2 * i)) for i in range(6)],
+    "pile": [Box(CUBE, 1.0 + i, (0.06 * i, 0, 0.105 + 0.21 * i)) for i in range(6)],
+}
+# two pads on slides press a box by 40 N each, and hold it in the air
+GRIPPER = """
+<mujoco><option timestep="0.002" cone="elliptic"/>
+  <worldbody>
+    <body name="box" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" mass="2"/></body>
+    <body name="left" pos="-.15 0 1"><joint name="left" type="slide" axis="1 0 0"/>
+      <geom type="box" size=".05 .1 .1" mass="1"/></body>
+    <body name="right" pos=".15 0 1"><joint name="right" type="slide" axis="-1 0 0"/>
+      <geom type="box" size=".05 .1 .1" mass="1"/></body>
+  </worldbody>
+  <actuator><motor joint="left"/><motor joint="right"/></actuator>
+  <keyframe><key name="start" qpos="0 0 1 1 0 0 0 0 0" ctrl="40 40"/></keyframe>
+</mujoco>
+"""
+
+
+def mjcf(boxes: list[Box], cone: str = "elliptic") -> str:
+    """The scene as MuJoCo's file."""
+    bodies = "".join(
+        f'<body pos="{words(box.place)}"><freejoint/>'
+        f'<geom type="box" size="{words(box.half)}" mass="{box.mass}"/></body>'
+        for box in boxes
+    )
+    speeds = " ".join(f"{words(box.velocity)} 0 0 0" for box in boxes)
+    places = " ".join(f"{words(box.place)} 1 0 0 0" for box in boxes)
+    return (
+        f'<mujoco><option timestep="{H}" cone="{cone}"/>'
+        f'<default><geom friction="{MU} 0 0"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody>'
+        f'<keyframe><key name="start" qpos="{places}" qvel="{speeds}"/></keyframe></mujoco>'
+    )
+
+
+def words(numbers: Any) -> str:
+    """Numbers, side by side."""
+    return " ".join(map(str, numbers))
+
+
+def scene_text(scene: str) -> str:
+    """The scene as MuJoCo's file, with elliptic cones."""
+    if scene == "gripper":
+        return GRIPPER.replace(
+            "<worldbody>", f'<default><geom friction="{MU} 0 0"/></default><worldbody>'
+        )
+    return mjcf(SCENES[scene])
+
+
+def mujocos(scene: str, steps: int) -> Iterator[Any]:
+    """MuJoCo's steps."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(scene_text(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for _ in range(steps):
+        yield recorders.mujoco(model, data)
+
+
+def boxes_of(scene: str) -> list[Box]:
+    """The boxes. ValueError if the scene has joints."""
+    if scene not in SCENES:
+        raise ValueError(f"{scene}: has joints, which are not built here for this engine")
+    return SCENES[scene]
+
+
+def drakes(scene: str, steps: int) -> Iterator[Any]:
+    """Drake's steps, judged by the law of rigid contacts."""
+    import pydrake.all as drake
+
+    boxes = boxes_of(scene)
+    builder = drake.DiagramBuilder()
+    plant, _ = drake.AddMultibodyPlantSceneGraph(builder, H)
+    plant.set_contact_model(drake.ContactModel.kPoint)
+    plant.set_discrete_contact_approximation(drake.DiscreteContactApproximation.kSap)
+    plant.SetUseSampledOutputPorts(False)
+
+    def properties() -> Any:
+        known = drake.ProximityProperties()
+        friction = drake.CoulombFriction(MU, MU)
+        drake.AddContactMaterial(friction=friction, properties=known)
+        return known
+
+    floor = drake.RigidTransform([0, 0, -0.5])
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), floor, drake.Box(90, 90, 1), "floor", properties()
+    )
+    for i, box in enumerate(boxes):
+        edges = [2 * half for half in box.half]
+        body = plant.AddRigidBody(
+            f"box{i}", drake.SpatialInertia.SolidBoxWithMass(box.mass, *edges)
+        )
+        plant.RegisterCollisionGeometry(
+            body, drake.RigidTransform(), drake.Box(*edges), f"box{i}", properties()
+        )
+        # Drake has one point for two boxes: small spheres give the corners
+        for k in range(8):
+            corner = [half * (1 - 2 * (k >> axis & 1)) for axis, half in enumerate(box.half)]
+            plant.RegisterCollisionGeometry(
+                body, drake.RigidTransform(corner), drake.Sphere(1e-4), f"{i}.{k}", properties()
+            )
+    plant.Finalize()
+    simulator = drake.Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    for i, box in enumerate(boxes):
+        body = plant.GetBodyByName(f"box{i}")
+        plant.SetFreeBodyPose(context, body, drake.RigidTransform(list(box.place)))
+        speed = drake.SpatialVelocity(w=[0, 0, 0], v=list(box.velocity))
+        plant.SetFreeBodySpatialVelocity(body, speed, context)
+    for step in range(steps):
+        yield recorders.drake(plant, context)
+        simulator.AdvanceTo((step + 1) * H)
+
+
+def bullets(scene: str, steps: int) -> Iterator[Any]:
+    """PyBullet's steps."""
+    import pybullet as bullet
+
+    boxes = boxes_of(scene)
+    client = bullet.connect(bullet.DIRECT)
+    bullet.setGravity(0, 0, -9.81)
+    bullet.setTimeStep(H)
+    bodies = [bullet.createMultiBody(0, bullet.createCollisionShape(bullet.GEOM_PLANE))]
+    for box in boxes:
+        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=box.half)
+        bodies.append(bullet.createMultiBody(box.mass, shape, basePosition=box.place))
+        bullet.resetBaseVelocity(bodies[-1], box.velocity)
+    for body in bodies:
+        # coefficients multiply
+        friction = MU**0.5
+        bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0, lateralFriction=friction)
+    for _ in range(steps):
+        yield recorders.pybullet(client)
+    bullet.disconnect()
+
+
+def newtons(scene: str, steps: int) -> Iterator[Any]:
+    """Newton's steps by Kamino, in single precision."""
+    import newton
+    import warp
+
+    boxes = boxes_of(scene)
+    builder = newton.ModelBuilder()
+    newton.solvers.SolverKamino.register_custom_attributes(builder)
+    kind = newton.ModelBuilder.ShapeConfig
+    builder.add_ground_plane(cfg=kind(mu=MU))
+    for box in boxes:
+        body = builder.add_body(xform=warp.transform(warp.vec3(*box.place), warp.quat_identity()))
+        x, y, z = box.half
+        material = kind(mu=MU, density=box.mass / (8 * x * y * z))
+        builder.add_shape_box(body, hx=x, hy=y, hz=z, cfg=material)
+    model = builder.finalize(device="cpu")
+    solver = newton.solvers.SolverKamino(
+        model, newton.solvers.SolverKamino.Config(use_collision_detector=True)
+    )
+    states = [model.state(), model.state()]
+    speeds = [[*box.velocity, 0.0, 0.0, 0.0] for box in boxes]
+    states[0].body_qd.assign(speeds)
+    for _ in range(steps):
+        solver.step(*states, None, None, H)
+        states.reverse()
+        yield recorders.newton(solver)
+
+
+def siconoses(scene: str, steps: int) -> Iterator[Any]:
+    """Siconos' steps."""
+    boxes = json.dumps([asdict(box) for box in boxes_of(scene)])
+    yield from recorders.siconos(SICONOS, arguments=[str(steps), boxes])
+
+
+def ours(scene: str, steps: int) -> Iterator[Any]:
+    """Our own steps, by `auto`."""
+    from fclib import scenes, simulate
+
+    for step in simulate.simulate(scenes.Scene(name=scene, xml=scene_text(scene)), steps):
+        yield Own(step.problem, step.result.solution)
+
+
+@dataclass(frozen=True)
+class Own:
+    """A step of our own, to be written as those that are recorded."""
+
+    problem: Any
+    guess: Any
+
+    def write(self, path: Path) -> None:
+        """Write the problem, and the solution as a guess."""
+        fclib.write(path, self.problem, None, [self.guess])
+
+
+ENGINES: dict[str, Callable[[str, int], Iterator[Any]]] = {
+    "MuJoCo": mujocos,
+    "Drake": drakes,
+    "Newton": newtons,
+    "PyBullet": bullets,
+    "Siconos": siconoses,
+    "FCLIB": ours,
+}
+
+
+def judged(engine: str, scene: str, steps: int) -> list[recorders.Judgement]:
+    """One step in KEPT that has contacts, judged."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = []
+        for k, one in enumerate(ENGINES[engine](scene, steps)):
+            if k % KEPT == 0 and one is not None and one.problem.nc:
+                paths.append(Path(folder) / f"{k:06d}.hdf5")
+                one.write(paths[-1])
+        return list(recorders.judge(paths))
+
+
+def main() -> None:
+    """Print the table, and store it."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    every = [*SCENES, "gripper"]
+    parser.add_argument("--scene", action="append", choices=every)
+    parser.add_argument("--engine", action="append", choices=list(ENGINES))
+    parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--pages", type=Path, help="folder for a page of each scene")
+    _results.add_option(parser)
+    arguments = parser.parse_args()
+    table = []
+    for scene in arguments.scene or every:
+        runs = {}
+        for engine in arguments.engine or ENGINES:
+            try:
+                steps = judged(engine, scene, arguments.steps)
+            except (ImportError, ValueError) as error:
+                print(f"left out: {engine}: {error}", file=sys.stderr)
+                continue
+            if not steps:
+                print(f"left out: {engine}: {scene}: nothing touches", file=sys.stderr)
+                continue
+            runs[engine] = steps
+            row = {"scene": scene, **recorders.summary(steps), "engine": engine}
+            table.append({key: shown(value) for key, value in row.items()})
+            print("  ".join(table[-1].values()), flush=True)
+        if arguments.pages and runs:
+            from fclib.report.judged import write_judged
+
+            write_judged(runs, arguments.pages / f"{scene}.html")
+    if not table:
+        sys.exit("no engine is installed: pip install 'fclib[recorders]'")
+    if arguments.results:
+        path = _results.store(
+            arguments.results,
+            table,
+            title="Engines beside Coulomb's law",
+            note="Medians and the worst of the steps. Engines have their default settings.",
+            command="PYTHON -m workshop.tables.judged_engines --results judged-engines",
+        )
+        print(path)
+
+
+def shown(value: Any) -> str:
+    """A cell of the table."""
+    return f"{value:.2g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main()

@@ -1,0 +1,143 @@
+"""How the solvers did on the set `standard`, by the runs that its classes follow from.
+
+    python -m workshop.tables.standard_table [--results]
+
+Nothing is run: the runs are those of campaigns/standard.toml, which `fclib collection status
+standard --add STORE` has taken in (collection/fclib_collection/results/runs.csv). They are compared
+as `fclib profile` compares those of a store (`fclib.bench.comparison`): on the problems that all of
+the solvers take, where each family weighs the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter, defaultdict
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib import scenes
+from fclib._verdicts import UNSUITABLE
+from fclib.bench import comparison, profiles
+from fclib.collections import standing
+from workshop.tables import _results
+
+WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
+
+
+def votes() -> dict[tuple[str, str], standing.Run]:
+    """The last run of each problem and solver that takes it, at the limit of its family.
+
+    Of the solvers that were tried on the whole set: other campaigns share some of its problems.
+    """
+    rows, basis = standing.standings(standing.FIRST)
+    assert basis is not None, "no runs are stored"
+    own = {row.digest[: standing.DIGITS]: row for row in rows if row.limit is not None}
+    found = {}
+    for run in sorted(standing.runs(), key=standing.when):
+        row = own.get(run.digest)
+        if row is not None and run.limit == row.limit:
+            found[row.id, run.solver] = run
+    tried = Counter(solver for _, solver in found)
+    most = max(tried.values())
+    return {key: run for key, run in found.items() if tried[key[1]] == most}
+
+
+def rows_of(runs: dict[tuple[str, str], standing.Run]) -> list[dict[str, Any]]:
+    """The runs as a store has them."""
+    return [
+        {
+            "solver": solver,
+            "hash": run.digest,
+            "problem": name,
+            "family": name.split("/")[1],
+            "nc": None,
+            "tol": standing.TOLERANCE,
+            "time_limit": run.limit,
+            "status": run.status,
+            "cpu_s": run.cpu,
+        }
+        for (name, solver), run in runs.items()
+    ]
+
+
+def solver_rows(costs: profiles.Costs, taken: Counter[str]) -> list[dict[str, Any]]:
+    """A row a solver, the one that solves the largest share first."""
+    quotients = profiles.ratios(costs.values)
+    weights = costs.weights(WEIGH)
+    within = profiles.share_within(quotients, np.array([2.0, 10.0]), weights)
+    found = []
+    for row in profiles.summary(costs, weigh=WEIGH)[1:]:
+        k = costs.solvers.index(row["solver"])
+        alone = costs.solved[:, k] & (costs.solved.sum(axis=1) == 1)
+        found.append(
+            {
+                "solver": row["solver"],
+                "family": fclib.find_solver(row["solver"]).family,
+                "takes": taken[row["solver"]],
+                "solved": f"{row['solved']} of {row['of']}",
+                "share": f"{100 * row['share']:.0f} %",
+                "alone": int(alone.sum()),
+                "fastest": row["fastest"],
+                "within 2x of the fastest": f"{100 * within[k, 0]:.0f} %",
+                "within 10x": f"{100 * within[k, 1]:.0f} %",
+                "mean [ms]": 1e3 * row["mean"],
+            }
+        )
+    return found
+
+
+def main() -> None:
+    """Print the tables, or store them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--results", action="store_true", help="store them in docs/results/")
+    arguments = parser.parse_args()
+
+    runs = votes()
+    every = profiles.gather(rows_of(runs))
+    costs = every.shared()
+    taken = Counter(solver for (_, solver), run in runs.items() if run.status != UNSUITABLE)
+    solvers = solver_rows(costs, taken)
+
+    kinds: dict[str, list[int]] = defaultdict(list)
+    families = scenes.families() | scenes.assemblies()
+    for k, one in enumerate(every.instances):
+        kinds[families[one.family].collection].append(k)
+    table: list[dict[str, Any]] = []
+    for kind, places in kinds.items():
+        # of a kind that only some take, these
+        part = comparison.compared(every.of(places))
+        rows = {row["solver"]: row for row in profiles.summary(part, weigh=WEIGH)[1:]}
+        ranked = [name for name in rows if name != "auto"]
+        row = {"kind": kind, "problems": len(part.instances), "solvers": len(rows)}
+        for title, solver in (("auto", "auto"), ("next", ranked[0]), ("then", ranked[1])):
+            if title != "auto":
+                row[title] = solver
+            row[f"{title}: solved"] = rows[solver]["solved"]
+            row[f"{title}: mean [ms]"] = 1e3 * rows[solver]["mean"]
+        fewest = min(rows[name]["share"] for name in ranked)
+        row["others: fewest solved"] = f"{100 * fewest:.0f} %"
+        table.append(row)
+    table.sort(key=lambda row: -row["problems"])
+
+    limits = sorted({one.limit for one in every.instances})
+    dates = sorted({run.date for run in runs.values()})
+    note = (
+        f"{len(every.instances)} problems to 1e-8 by both merits, or proved to have no solution;"
+        f" {' or '.join(f'{limit:g}' for limit in limits)} s of CPU a run; of these"
+        f" {len(costs.instances)} that all {len(costs.solvers)} solvers take; each family weighs"
+        " the same in shares and means, failures count as ten times the limit; the runs are of"
+        f" {' to '.join(dict.fromkeys((dates[0], dates[-1])))}."
+    )
+    if arguments.results:
+        _results.store("standard-solvers", solvers, title="The set standard", note=note)
+        _results.store("standard-kinds", table, title="The set standard, by kind", note=note)
+    for printed in (solvers, table):
+        print(_results.table(list(printed[0]), printed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What chose the stages of `auto` and constants of methods; notes.md has what was tried."""

@@ -518,7 +518,7 @@ def test_a_periodic_deck_with_a_floor_that_moves(tmp_path: Path) -> None:
 
 
 def test_a_penetration_stays_in_a_stored_state(tmp_path: Path) -> None:
-    """The law of the deck says what becomes of it: nothing moves bodies before a state is stored."""
+    """The law of the deck says what becomes of it: no body is moved before."""
     pytest.importorskip("mujoco")
     from fclib.simulate import MujocoModel, relaxed, scheme_of
 

@@ -96,12 +96,12 @@ def main() -> None:
         kept.append(step_of(state, one))
         worst = max(worst, one.mismatch)
         # H from what is stored is that of the recorder
-        made = recorded.problem_of(recorded.File(about, np.zeros((0, 3)), (kept[-1],), own), 0)
+        made = recorded.problem_of(recorded.File(about, np.zeros((0, 3)), (kept[-1],), (), own), 0)
         off = abs(made.H - one.problem.H).max()
         print(f"{state.number}: {made.nc} contacts, H off {off:.0e}, v off {one.mismatch:.0e} m/s")
     arguments.out.mkdir(parents=True, exist_ok=True)
     path = arguments.out / f"{arguments.name}.npz"
-    file = recorded.File(about, np.zeros((0, 3)), tuple(kept), own)
+    file = recorded.File(about, np.zeros((0, 3)), tuple(kept), (), own)
     digests = [fclib.digest(recorded.problem_of(file, k)) for k in range(len(kept))]
     recorded.write(path, replace(file, digests=tuple(digests)))
     print(f"{path}: {len(kept)} steps, {len(set(digests))} distinct, {path.stat().st_size} bytes")

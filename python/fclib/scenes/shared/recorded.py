@@ -78,8 +78,8 @@ class File:
     about: dict[str, Any]
     half: Vector  # (nb x 3) of boxes [m]
     steps: tuple[Step, ...]
-    polyhedra: Polyhedra | None = None
     digests: tuple[str, ...] = ()  # of the problems, as they were when the file was made
+    polyhedra: Polyhedra | None = None  # the bodies, if they are no boxes
 
 
 def write(path: Path, file: File) -> None:
@@ -89,9 +89,10 @@ def write(path: Path, file: File) -> None:
     if file.polyhedra is not None:
         own = file.polyhedra
         arrays |= {"solid_moves": own.moves, "solid_mass": own.mass}
-        for name, values in (("vertices", own.vertices), ("faces", own.faces)):
-            arrays[f"solid_{name}"] = np.concatenate(values)
-            arrays[f"solid_{name}_of"] = np.cumsum([len(value) for value in values])
+        tables: dict[str, tuple[Any, ...]] = {"vertices": own.vertices, "faces": own.faces}
+        for name, rows in tables.items():
+            arrays[f"solid_{name}"] = np.concatenate(rows)
+            arrays[f"solid_{name}_of"] = np.cumsum([len(row) for row in rows])
     parts: dict[str, list[Any]] = {}
     for step in file.steps:
         for field in fields(Step):
@@ -140,7 +141,7 @@ def read(path: Path) -> File:
                 mine[name] = sp.csc_array(three, shape=(n, columns))
         steps.append(Step(**mine))
     digests = tuple(about.pop("digests"))
-    return File(about, half, tuple(steps), polyhedra, digests)
+    return File(about, half, tuple(steps), digests, polyhedra)
 
 
 def problem_of(file: File, number: int) -> Any:

@@ -39,6 +39,7 @@ from fclib.recorders._assemble import Assembled, Contacts, Vector
 from fclib.recorders._recorded import Origin, Recorded, Recording
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene, polyhedron
+from fclib.scenes.shared.deck_data import RIGID, Deck, Law
 from fclib.scenes.shared.interaction import Course
 from fclib.scenes.shared.recorded import jacobian
 
@@ -213,7 +214,7 @@ def write_deck(path: Path, source: Source) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def one_law(deck: decks.Deck, notes: list[str]) -> tuple[decks.Law, float]:
+def one_law(deck: Deck, notes: list[str]) -> tuple[Law, float]:
     """The law and alert distance that the engine takes for all pairs: the deck's most frequent."""
     if not deck.sees:
         raise ValueError(f"{deck.path / 'TACT_BEHAV.DAT'}: nothing sees anything")
@@ -249,7 +250,7 @@ def one_law(deck: decks.Deck, notes: list[str]) -> tuple[decks.Law, float]:
     return law, alert
 
 
-def solid(deck: decks.Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
+def solid(deck: Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
     """The vertices in the world and the triangles of a body of a deck. ValueError."""
     body = deck.rigid[index]
     if len(body.contactors) != 1:
@@ -258,7 +259,7 @@ def solid(deck: decks.Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
         )
     one = deck_scene.placed(deck, index, notes)
     if one.velocity.any():
-        deck.starts[decks.RIGID, index, 0].place.fail(
+        deck.starts[RIGID, index, 0].place.fail(
             "a body that moves at the start; the engine of compas_lmgc90 starts at rest"
         )
     contactor, vertices, origin = one.shapes[0]

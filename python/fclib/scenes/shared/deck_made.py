@@ -9,18 +9,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from fclib.scenes.shared.deck import (
+from fclib.scenes.shared.deck_data import (
     RIGID,
     Contactor,
     Deck,
     Driven,
     Law,
     Material,
-    Place,
     RigidBody,
     See,
     Start,
 )
+from fclib.scenes.shared.deck_lines import Place
 from fclib.scenes.shared.deck_scene import scene_of
 from fclib.scenes.shared.family import Scene
 from fclib.scenes.shared.interaction import Course

@@ -20,15 +20,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.scenes.shared import mjcf, polyhedron
-from fclib.scenes.shared.deck import (
+from fclib.scenes.shared.deck_data import (
     MESH,
     RIGID,
     SEEN,
     Contactor,
     Deck,
-    DeckError,
     Mesh,
 )
+from fclib.scenes.shared.deck_lines import DeckError
 from fclib.scenes.shared.family import Scene
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import HexMesh, Solids, Surface

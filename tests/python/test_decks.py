@@ -265,6 +265,31 @@ def test_what_is_not_known_is_named(tmp_path: Path) -> None:
     assert "not supported" in refused.output
 
 
+def test_a_periodic_deck_on_the_command_line(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    bodies = [
+        write.body(1, (0, 0, -0.5), write.plate((20, 20, 0.5))),
+        write.body(1, (4.6, 0, 0.5), write.ball(0.5)),
+        write.body(2, (-4.6, 0, 0.5), write.ball(0.5)),
+    ]
+    ball, plate = "RBDY3  SPHER  BLEUx", "RBDY3  PLANx  VERTx"
+    path = write.blocks(
+        tmp_path,
+        BODIES="\n".join(bodies),
+        TACT_BEHAV="\n".join((write.law("iqsc0"), write.see(ball, plate), write.see(ball, ball))),
+        DRV_DOF=write.driven(1, *write.STILL),
+    )
+    arguments = ["simulate", str(path), "--time-step", "1e-3", "--steps", "2", "--no-pictures"]
+    for period, contacts in (([], 2), (["--period", "10.2", "10.2"], 3)):
+        out = tmp_path / f"out{contacts}"
+        done = CliRunner().invoke(app, [*arguments, *period, "--out", str(out)])
+        assert done.exit_code == 0, done.output
+        problem: Any = fclib.read(next(out.rglob("*-global.hdf5")))
+        assert problem.nc == contacts
+        said = json.loads(problem.info.description.splitlines()[-1])
+        assert (said["theta"], said["time_step"], said["laws"]) == (0.5, 1e-3, ["IQS_CLB"])
+
+
 def test_options_that_are_not_for_decks(tmp_path: Path) -> None:
     path = write.blocks(tmp_path)
     for more, message in (
@@ -593,6 +618,21 @@ def test_two_elastic_cubes_at_rest(tmp_path: Path) -> None:
     held = np.unique([drive.dof for drive in scene.drives])
     assert not last.velocity[held].any()
     assert last.contacts.mu == pytest.approx(0.3)
+
+
+def test_a_mesh_may_begin_displaced_and_in_motion(tmp_path: Path) -> None:
+    """DOF.INI of nodes: the upper cube begins higher, and falls until it touches."""
+    lines = ["$bdyty", " MAILx      2", "$model", " MECAx", "$nodty"]
+    for node in range(1, 28):
+        lines.append(f" NO3xx  {node:5d}   X(1)= 0.0  X(2)= 0.0  X(3)= 0.002")
+        lines.append("                V(1)= 0.1  V(2)= 0.0  V(3)= -0.5")
+    path = write.cubes(tmp_path, DOF="\n".join([*lines, "$$$$$$"]))
+    scene = scene_of(path, time_step=1e-3, theta=1.0)
+    steps = steps_of(scene, 5)
+    np.testing.assert_allclose(steps[0].contacts.gap, 0.002, atol=1e-12)
+    velocity = steps[0].velocity.reshape(-1, 3)[27:]
+    np.testing.assert_allclose(velocity, [[0.1, 0, -0.5 - 1e-3 * G]] * 27, atol=1e-12)
+    assert steps[-1].contacts.gap.min() < 1e-6
 
 
 def test_a_mesh_that_is_pulled_moves_as_it_is_told(tmp_path: Path) -> None:

@@ -8,8 +8,9 @@ deck_scene.py the scene of a deck; deck_made.py: of a deck that is made by a rul
 interaction.py  which shapes meet by which law, and what is driven
 polyhedron.py volume, centre and inertia of polyhedra
 recorded.py   steps of other engines as arrays in a file
-solids.py     elastic blocks and meshes, with loads and supports, for the finite elements of `simulate`
+solids.py     elastic blocks and meshes, with loads and supports, for finite elements
 assembly.py   rigid bodies and contacts from geometry alone, assembled into a problem
 
-family.py imports interaction.py and solids.py, masonry.py and deck_scene.py mjcf.py, and nothing here imports a family.
+family.py imports interaction.py and solids.py, masonry.py and deck_scene.py import mjcf.py, and
+nothing here imports a family.
 """

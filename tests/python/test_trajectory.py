@@ -468,6 +468,7 @@ NOT_SIMULATED = {
     "ChuteLocalProblems",
     "FrictionRange",
     "Jammed",
+    "LMGC90Bridge",
     "LocalProblems",
     "ManySolutions",
     "MassRatios",
@@ -574,6 +575,8 @@ def check_digest(folder: str, states: Any, place: int, problem: Any) -> None:
 def deepest(name: str, states: Any) -> float:
     """How deep bodies may be in each other [m]."""
     folder = name.rpartition("-")[0]
+    if states.scene.interactions:
+        return float("inf")  # the laws of a deck keep penetrations
     size = states.model.smallest_size
     if size is None:
         size = 0.5 * min(min(block.size) for block in states.scene.solids.blocks)

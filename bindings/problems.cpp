@@ -42,6 +42,15 @@ void bind_problem(nb::module_& m) {
   def_fields(cls);
   def_equality(cls);
   def_html(cls);
+  cls.def(
+      "view",
+      [](nb::handle self, nb::handle solution) {
+        return nb::module_::import_("fclib.notebook").attr("view")(self, solution);
+      },
+      nb::arg("solution") = nb::none(),
+      nb::sig("def view(self, solution: Solution | Result | None = None) -> Any"),
+      "Contacts and bodies in space, for a notebook, with the reactions of a solution if one is\n"
+      "given. See fclib.notebook.view.");
   cls.def_prop_ro("info", [](const P& p) { return p.info; }, "title, description, math_info");
   cls.def_prop_ro(
       "matrix_info",

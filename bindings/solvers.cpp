@@ -412,6 +412,14 @@ void bind_solvers(nb::module_& m) {
       result, [](const Result& a, const Result& b) { return same(a, b); },
       [](const Result& self) { return self.solver + std::to_string(self.iterations); });
   def_html(result);
+  result.def(
+      "plot",
+      [](nb::handle self) {
+        return nb::module_::import_("fclib.notebook").attr("plot")(self);
+      },
+      nb::sig("def plot(self) -> Any"),
+      "How the error fell, for a notebook, where fclib.solve was asked for the history. See\n"
+      "fclib.notebook.plot.");
   result.def_ro("solution", &Result::solution)
       .def_prop_ro(
           "status", [](const Result& r) { return std::string(name_of(r.status)); },

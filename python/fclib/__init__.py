@@ -6,6 +6,7 @@
 >>> fclib.merit(problem, result.solution).error
 """
 
+import importlib
 import typing
 
 from fclib._batch import BatchResult, solve_batch
@@ -124,6 +125,20 @@ def sequence(
     return collections.sequence(name, folder, form)
 
 
+def profile(store: "str | Path", **options: typing.Any) -> typing.Any:
+    """The performance profile of a store of ``fclib bench``, as a figure for a notebook.
+
+    Args:
+        store: the file.
+        options: tol, solvers, metric, own_set, weigh, as ``fclib.notebook.profile`` has them.
+
+    Raises:
+        ValueError: there is no such store, or nothing in it to compare.
+        ImportError: Plotly is missing.
+    """
+    return importlib.import_module("fclib.notebook").profile(store, **options)
+
+
 __all__ = [
     "BatchResult",
     "Bodies",
@@ -167,6 +182,7 @@ __all__ = [
     "merge",
     "merit",
     "merit_1",
+    "profile",
     "read",
     "read_attributes",
     "read_guesses",

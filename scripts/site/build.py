@@ -40,6 +40,7 @@ MODULE_FILES = ("fclib.js", "fclib-core.mjs", "fclib-core.wasm")
 # the menu; FOLDER/* stands for the generated pages of a folder
 MENU = {
     "Start": [
+        "installing",
         "tutorial-problem",
         "tutorial-solver",
         "tutorial-robot",

@@ -26,7 +26,7 @@ from fclib.bench import machine, meter, pool, problems, processes, template
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
 from fclib.bench.runner import warn_of_locks
-from fclib.bench.supervisor import prove
+from fclib.bench.supervisor import Supervisor, prove
 from helpers import planted_local
 
 LIMIT = 0.5  # [s], of the one limit that a solver is to meet
@@ -1016,6 +1016,28 @@ def test_a_proof_that_there_is_no_solution_is_checked_and_kept(
         merged.merge([tmp_path / "runs.sqlite"])
         (row,) = merged.results()
         assert merged.certificate(row["run"]) == record.certificate
+
+
+@pytest.mark.parametrize(
+    ("cpu", "wall", "status"),
+    [(1.0, 1.0, "infeasible"), (11.0, 1.0, "time_limit"), (1.0, 11.0, "time_limit")],
+)
+def test_a_proof_that_comes_too_late_is_none(
+    cpu: float, wall: float, status: str, folder: Path, tmp_path: Path
+) -> None:
+    """It is judged as a solution is: within both limits, of 10 s."""
+    problem: Any = fclib.read(closing_walls(tmp_path))
+    result = fclib.solve(problem)
+    vectors = {
+        "r": result.solution.r,
+        "certificate_y": result.certificate,
+        "certificate_z": result.certificate_z,
+    }
+    order = {"limits": {"time": 10.0, "wall": 10.0}, "merit": "both", "tol": 1e-8}
+    record = Record("infeasible", cpu_s=cpu, wall_s=wall)
+    Supervisor.judge(None, order, problem, record, vectors)  # type: ignore[arg-type]
+    assert record.status == status
+    assert record.solved is (status == "infeasible")
 
 
 @pytest.mark.parametrize("y", [None, np.array([1.0, 2.0]), np.array([1.0]), np.array([1, np.nan])])

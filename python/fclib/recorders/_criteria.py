@@ -9,7 +9,8 @@ so that steps and scenes can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -114,17 +115,27 @@ def judge(paths: Sequence[Path], *, tolerance: float = 1e-8) -> Iterator[Judgeme
         result = _solve.solve(problem, tol=tolerance)
         found = _core.merit(problem, result.solution)
         own = origin.get("engine", path.parent.name)
-        moment = origin.get("time", 0.0)
+        if origin.get("generator") == "fclib.simulate":
+            own = "FCLIB"
         yield Judgement(
             engine=str(own.get("name") if isinstance(own, dict) else own),
             file=str(path),
-            time=float(moment) if isinstance(moment, (int, float)) else 0.0,
+            time=time_of(origin, path),
             contacts=problem.nc,
             **criteria_of(problem, guesses[0]),
             auto_status=str(result.status),
             auto_error=found.error,
             auto_cpu=result.cpu_s,
         )
+
+
+def time_of(origin: Mapping[str, Any], path: Path) -> float:
+    """The time of a step [s]; the number of its file counts where the engine tells no time."""
+    told, h = (origin.get(name) for name in ("time", "time_step"))
+    number = re.search(r"\d+$", path.stem)
+    if not told and isinstance(h, (int, float)) and number:
+        return float(h) * int(number[0])
+    return float(told) if isinstance(told, (int, float)) else 0.0
 
 
 def summary(steps: Sequence[Judgement]) -> dict[str, Any]:

@@ -64,9 +64,9 @@ void bind_conversions(nb::module_& m) {
         nb::scope(cls), nb::name("with_storage"), nb::is_method(), nb::sig(signature.c_str()),
         "storage"_a, nb::call_guard<Unlocked>(),
         "The same problem with all matrices in one storage: csr, csc, triplet or dense. "
-        "Duplicates are added up where the storage changes.\n\n"
-        "Raises OptionError for another name, UnsuitableError where a dense matrix would be too "
-        "large, ProblemError where the data is not valid.");
+        "If the storage changes, duplicates are added up.\n\n"
+        "Raises OptionError for another name, UnsuitableError if a dense matrix would be too "
+        "large, ProblemError if the data is not valid.");
   });
 }
 

@@ -167,7 +167,7 @@ void for_each_part(OptionOrConst& option, const Visitor& visit) {
   visit("highest", option.highest);
 }
 
-/// ... and a stage.
+/// Visits (name, member) of all parts of a stage.
 template <class StageOrConst, class Visitor>
   requires std::same_as<std::remove_const_t<StageOrConst>, Stage>
 void for_each_part(StageOrConst& stage, const Visitor& visit) {
@@ -254,7 +254,7 @@ void set_state(Result& result, const nb::dict& values) {
   }
 }
 
-/// All but the times, which differ between runs.
+/// Whether two results agree. Times are not compared: they differ from run to run.
 bool same(const Result& a, const Result& b) {
   const auto same_point = [](const HistoryPoint& one, const HistoryPoint& other) {
     return std::tie(one.iteration, one.error, one.stage) ==
@@ -414,11 +414,9 @@ void bind_solvers(nb::module_& m) {
   def_html(result);
   result.def(
       "plot",
-      [](nb::handle self) {
-        return nb::module_::import_("fclib.notebook").attr("plot")(self);
-      },
+      [](nb::handle self) { return nb::module_::import_("fclib.notebook").attr("plot")(self); },
       nb::sig("def plot(self) -> Any"),
-      "How the error fell, for a notebook, where fclib.solve was asked for the history. See\n"
+      "How the error fell, for a notebook, if fclib.solve was asked for the history. See\n"
       "fclib.notebook.plot.");
   result.def_ro("solution", &Result::solution)
       .def_prop_ro(
@@ -471,10 +469,11 @@ void bind_solvers(nb::module_& m) {
           "if the proof is exact. It is finite if only the last digits of W are left of W^T E y.\n"
           "Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
-      .def_prop_ro("history", history_of,
-                   nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
-                   "Where fclib.solve was asked for it: what the solver reported, a structured "
-                   "array with iteration, error, time [s] and stage.")
+      .def_prop_ro(
+          "history", history_of,
+          nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
+          "The reports of the solver, if fclib.solve was asked for them: a structured array "
+          "with iteration, error, time [s] and stage.")
       .def("__repr__", [](const Result& r) {
         char text[160];
         std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",

@@ -1,7 +1,7 @@
-// Problems and solutions from JavaScript and back, by their fields(): what bindings/fields.hpp is
-// for Python. To there they go as plain objects; from there as numbers in memory, where fclib.js
-// puts them, since a property that the core looks up takes as long as an iteration on a small
-// problem.
+// Problems and solutions from JavaScript and back, by their fields(), as bindings/fields.hpp does
+// for Python. JavaScript gets them as plain objects. The core gets them as numbers in memory, which
+// fclib.js has written there: if the core looked up one property of an object, this would take as
+// long as an iteration on a small problem.
 #pragma once
 
 #include <emscripten/val.h>
@@ -102,7 +102,7 @@ val problem_to_js(const P& problem) {
 /// they are. A call reads it before it does anything else; the next one writes over it.
 class Block {
  public:
-  /// The address of so many bytes; 0 where there are none left.
+  /// The address of so many bytes; 0 if there are none left.
   static int reserve(double bytes) {
     if (bytes > static_cast<double>(size_)) {
       std::free(bytes_);
@@ -112,7 +112,7 @@ class Block {
     return reinterpret_cast<int>(bytes_);
   }
 
-  /// `address` is that of the integers, of which the first is the size of the arrays [bytes].
+  /// `address` points to the integers. The first of them is the size of the arrays [bytes].
   explicit Block(int address) : next_(reinterpret_cast<const std::int32_t*>(address)) {
     arrays_ = reinterpret_cast<const char*>(address) - integer();
   }
@@ -127,7 +127,7 @@ class Block {
 
   std::int32_t integer() { return *next_++; }
 
-  /// The numbers of an array; empty where it was left out.
+  /// The numbers of an array; empty if it was left out.
   template <class Number>
   std::span<const Number> array() {
     const std::int32_t offset = integer();
@@ -223,7 +223,7 @@ std::vector<Number> numbers_from(const val& array, const std::string& where) {
   return result;
 }
 
-/// Others that an object has are passed over.
+/// Other properties of the object are ignored.
 inline void fill(ProblemInfo& self, const val& object) {
   for_each_field<ProblemInfo>([&](const Field<ProblemInfo, std::string>& field) {
     const std::string name(field.name);

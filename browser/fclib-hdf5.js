@@ -1,6 +1,6 @@
-// FCLIB files in a browser or in Node: all that core/io/hdf5/read.cpp reads, with its messages. What
-// the data must satisfy the core says (validate). HDF5 is that of h5wasm, of which a page loads
-// four megabytes when it reads its first file.
+// FCLIB files in a browser or in Node: it reads what core/io/hdf5/read.cpp reads, with the same
+// messages. The core itself checks the data (validate). HDF5 comes from h5wasm; a page loads its
+// four megabytes when it reads the first file.
 
 import { FclibError } from "./fclib.js";
 import { LayoutFile } from "./fclib-layout.js";
@@ -29,7 +29,7 @@ const widths_read = { [INTEGER]: [1, 2, 4, 8], [FLOAT]: [4, 8] }; // that h5wasm
 const product = (extents) => extents.reduce((all, extent) => all * extent, 1);
 const is_flat = (shape) => shape.filter((extent) => extent !== 1).length <= 1;
 
-/** A text of a file in a message: short, and without what would steer a terminal. */
+/** A text of a file, for a message: short, and without characters that control a terminal. */
 function quoted(text) {
   const bytes = [...new TextEncoder().encode(text)];
   const shown = bytes
@@ -48,7 +48,7 @@ function shortest(value) {
   return plain.includes("e") || plain.length > scientific.length ? scientific : plain;
 }
 
-/** What `read` returns. What cannot be read, and the problem can do without, is left out. */
+/** The result of `read`. A part that is not needed and cannot be read is left out. */
 function read_if_possible(left_out, otherwise, read) {
   try {
     return read();
@@ -59,7 +59,7 @@ function read_if_possible(left_out, otherwise, read) {
   }
 }
 
-/** A group of a file, and where it is. */
+/** A group of a file, and its path. */
 class Group {
   constructor(library, file, group, path) {
     Object.assign(this, { library, file, group, path });
@@ -70,7 +70,7 @@ class Group {
     return (this.path === "/" ? "/" : `${this.path}/`) + name;
   }
 
-  /** What has a name, or null. A link that leads to nothing, or elsewhere, is refused. */
+  /** The object of a name, or null. A link to nothing, or into another file, is refused. */
   get(name) {
     if (!this.found.has(name)) this.found.set(name, this.#look_up(name));
     return this.found.get(name);
@@ -97,7 +97,7 @@ class Group {
     let found = null;
     try {
       found = this.group.get(name);
-      // of a link that leads in a circle h5wasm says anything
+      // if a link leads in a circle, the answer of h5wasm is arbitrary
       if (target !== null && found instanceof Groups) found.keys();
       if (target !== null && found instanceof Dataset) found.metadata;
     } catch {
@@ -139,7 +139,7 @@ class Group {
     return { path, dataset: found, metadata, shape, size: product(shape) };
   }
 
-  /** Where the file keeps the data of a dataset, as far as it can be told. */
+  /** The places at which the file keeps the data of a dataset, as far as they are known. */
   place_of({ path, metadata }) {
     let place = {};
     try {
@@ -147,7 +147,7 @@ class Group {
       const reference = Uint8Array.from(module.create_object_reference(file_id, path));
       place = layouts.layout_of(Number(new DataView(reference.buffer).getBigUint64(0, true)));
     } catch {
-      // what is damaged HDF5 will not read either
+      // if it is damaged, HDF5 will refuse it too
     }
     if (metadata.virtual_sources || place.external) {
       fail(path, "keeps its data in other places, which are not read");
@@ -274,7 +274,7 @@ class Group {
     return this.#text_of(path, length, metadata.vlen);
   }
 
-  /** The bytes as UTF-8, which h5wasm takes for Latin letters where they are marked as ASCII. */
+  /** The bytes as UTF-8. If they are marked as ASCII, h5wasm takes them for Latin letters. */
   #text_of(path, length, vlen) {
     const { module, file_id } = this.file;
     const place = module._malloc(length);
@@ -337,7 +337,7 @@ function is_packed(group) {
   return value === 1;
 }
 
-/** Throws if nothing is counted, though values are there: then what counts them is missing. */
+/** Throws if the count is 0 but there are values: then the count or the pointers are missing. */
 function require_counted(x, counted, counter) {
   if (counted > 0 || x.length <= 1) return;
   const given = x.reduce((all, value) => all + (value !== 0 ? 1 : 0), 0);
@@ -440,7 +440,7 @@ function compressed(storage, size, rows, cols, values) {
   return { p, i: Int32Array.from(i), x: Float64Array.from(x) };
 }
 
-/** The symmetric matrix of which a valid one is a triangle: L + L^T - diag(L). */
+/** The symmetric matrix L + L^T - diag(L) of a valid triangle L. */
 function symmetric_of_triangle(matrix, where) {
   const { storage, rows, cols } = matrix;
   if (rows !== cols) {
@@ -614,7 +614,7 @@ function silence(files) {
 
 let checked = null;
 
-/** Lets reads throw that HDF5 could not do: h5wasm gives what memory held before. */
+/** Makes a read throw if HDF5 fails: h5wasm alone returns the old content of the memory. */
 function check_reads(module) {
   if (module === checked) return;
   checked = module;
@@ -627,8 +627,8 @@ function check_reads(module) {
 let count = 0;
 
 /**
- * What an FCLIB file holds: { problem, solution, guesses, contacts, bodies, left_out }. The last has
- * a line for each thing that the problem can do without, and that could not be read.
+ * The content of an FCLIB file: { problem, solution, guesses, contacts, bodies, left_out }. `left_out`
+ * has a line for each part that is not needed and could not be read.
  */
 export async function read_hdf5(fclib, bytes, kind = "") {
   if (!is_hdf5(bytes)) fail("", "is not an HDF5 file");
@@ -655,7 +655,7 @@ export async function read_hdf5(fclib, bytes, kind = "") {
     const root = new Group(library, opened, file, "/");
     const left_out = [];
     const problem = read_problem(fclib, root, kind_to_read(structs, root, kind), left_out);
-    // of several problems these are the first one's, which is the global one
+    // if there are several problems, these belong to the first, the global one
     const own = problem.kind === Object.keys(structs.problems).find((one) => root.has(`fclib_${one}`));
     const of_own = (otherwise, read) =>
       own ? read_if_possible(left_out, otherwise, () => read(structs, root)) : otherwise;

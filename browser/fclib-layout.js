@@ -1,6 +1,6 @@
-// Where an HDF5 file keeps the numbers of a dataset. h5wasm does not tell, so this reads the header
-// of the dataset: after "HDF5 File Format Specification", III.A (B-trees), IV.A (object headers) and
-// VII (indices of chunks).
+// The places at which an HDF5 file keeps the numbers of a dataset. h5wasm does not tell them, so this
+// reads the header of the dataset, after "HDF5 File Format Specification", III.A (B-trees), IV.A
+// (object headers) and VII (indices of chunks).
 
 const CONTIGUOUS = 1;
 const CHUNKED = 2;
@@ -66,9 +66,9 @@ export class LayoutFile {
   }
 
   /**
-   * What the header at a place says: whether the data are in other files (`external`), whether they
-   * have no room in this one (`unwritten`), how many bytes they take (`bytes`), and in how many
-   * chunks. Members that cannot be told are undefined.
+   * The facts of the header at a place: whether the data are in other files (`external`), whether
+   * they have no room in this file (`unwritten`), their size (`bytes`), and their number of chunks.
+   * A member that is not known is undefined.
    */
   layout_of(address) {
     const found = { external: false };
@@ -135,7 +135,7 @@ export class LayoutFile {
     const dimensions = cursor.number(1);
     const width = cursor.number(1);
     const index = cursor.skip(dimensions * width).number(1);
-    // what an index says of itself before its place
+    // the facts of an index that stand before its place
     const room = {
       [SINGLE_CHUNK]: filtered ? this.length_size + 4 : 0,
       [FIXED_ARRAY]: 1,
@@ -148,14 +148,14 @@ export class LayoutFile {
     const chunks = {
       [SINGLE_CHUNK]: () => 1,
       [FIXED_ARRAY]: () => this.#chunks_of_array(new Cursor(this, place)),
-      // the number of the last chunk that is there: of those before it some may be missing
+      // the number of the last chunk in the file; some before it may be missing
       [EXTENSIBLE_ARRAY]: () => new Cursor(this, place + 12 + 4 * this.length_size).length(),
       [TREE_2]: () => new Cursor(this, place + 18 + this.address_size).length(),
     }[index]();
     return { unwritten: chunks === 0, chunks };
   }
 
-  /** How many chunks a fixed array has a place for. */
+  /** The number of chunks for which a fixed array has a place. */
   #chunks_of_array(header) {
     const entry = header.skip(6).number(1);
     const page = 2 ** header.number(1);
@@ -175,7 +175,7 @@ export class LayoutFile {
     return sum;
   }
 
-  /** How many of these entries have an address. */
+  /** The number of these entries that have an address. */
   #places(from, entry, count) {
     let sum = 0;
     for (let k = 0; k < count; ++k) {

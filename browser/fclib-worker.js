@@ -72,16 +72,15 @@ export class FclibWorker {
     });
   }
 
-  /** Ends the worker; what it had not answered is rejected. A later call starts another. */
+  /** Ends the worker. Calls without an answer are rejected. A later call starts another worker. */
   close() {
     this.#end(new FclibError("internal", "the worker was closed"));
   }
 
   /**
-   * As Fclib.solve, in the worker. on_report gets the last of the reports of each 30 ms, with `r` as
-   * an array, and in `points` all [iteration, error, time] since the one before. The promise has
-   * stop(): it resolves at once, with the last iterate that was reported, and the status
-   * "interrupted".
+   * As Fclib.solve, in the worker. Every 30 ms on_report gets the last report, with `r` as an array.
+   * Its `points` has all [iteration, error, time] since the report before. The promise has stop():
+   * then it resolves at once, with the last reported iterate and the status "interrupted".
    */
   solve(problem, settings = {}, on_report = undefined) {
     let last;
@@ -113,7 +112,7 @@ export class FclibWorker {
   }
 }
 
-// ---- the worker itself: this file, loaded as one
+// ---- the worker itself: it loads this file too
 
 if (typeof WorkerGlobalScope !== "undefined" && self instanceof WorkerGlobalScope) {
   const loading = import("./fclib.js").then(({ load }) => load());

@@ -8,7 +8,7 @@
 // are Float64Array and whose matrices are { storage, rows, cols, p, i, x }. Calls do not return
 // before they are done: for a page that stays alive there is fclib-worker.js.
 
-/** What the core says is wrong. `kind`: file, problem, option, unsuitable, memory or internal. */
+/** An error of the core. `kind`: file, problem, option, unsuitable, memory or internal. */
 export class FclibError extends Error {
   constructor(kind, message, where = "") {
     super(message);
@@ -73,7 +73,7 @@ const is_missing = (value) => value === undefined || value === null;
 const is_array = (value) =>
   Array.isArray(value) || (ArrayBuffer.isView(value) && value.length !== undefined);
 
-/** A part of an array; to slice it takes a microsecond, whatever its size. */
+/** A part of an array. slice() would take a microsecond even for a small part. */
 function copy(numbers, first, size) {
   if (size > 64) return numbers.slice(first, first + size);
   const result = new Float64Array(size);
@@ -81,8 +81,8 @@ function copy(numbers, first, size) {
   return result;
 }
 
-/** What a call takes, in the memory of the core: arrays, and behind them integers that say what they
- * are, in the order of browser/convert.hpp. */
+/** The arguments of a call in the memory of the core: first the arrays, then integers that describe
+ * them, in the order of browser/convert.hpp. */
 class Block {
   #core;
   #structs;
@@ -230,20 +230,20 @@ export class Fclib {
     return this.solvers().filter((solver) => solver[dimensions].includes(problem.spacedim));
   }
 
-  /** { formulation, n, m, p, nc } of a problem; throws at the first thing wrong with its data. */
+  /** { formulation, n, m, p, nc } of a problem. Throws at the first fault of its data. */
   validate(problem) {
     return this.#call("validate", this.#block(problem).place());
   }
 
-  /** Throws where a solution does not fit the problem; `where` is its name in the message. */
+  /** Throws if a solution does not fit the problem; `where` is its name in the message. */
   validate_solution(problem, solution, where = "/solution") {
     this.#call("validate_solution", this.#block(problem).solution(solution).place(), where);
   }
 
   /**
-   * Solves a problem. on_report({ iteration, error, time, stage, r }) is called where the solver
-   * evaluates its error; where it returns false the solver stops. `r` is the iterate, copied when it
-   * is asked for, and undefined where the solver has none at hand.
+   * Solves a problem. Each time the solver evaluates its error, it calls
+   * on_report({ iteration, error, time, stage, r }). If this returns false, the solver stops. `r` is
+   * the iterate. It is copied when it is read, and undefined if the solver has no iterate to show.
    */
   solve(problem, settings = {}, on_report = undefined) {
     const own = complete(settings);
@@ -343,7 +343,7 @@ export class Fclib {
     return this.#call("merit", this.#block(problem).solution(solution).place());
   }
 
-  /** What libfclib calls MERIT_1. */
+  /** The merit that libfclib calls MERIT_1. */
   merit_1(problem, solution) {
     return this.#call("merit_1", this.#block(problem).solution(solution).place());
   }
@@ -374,8 +374,8 @@ export class Fclib {
     return this.#call("islands", this.#block(problem).place());
   }
 
-  /** What y (and z) prove: { y, z, gain, distance, bound }, or null. A proof whose bound is Infinity
-   * says that there is no solution, else that there is none of a smaller norm. */
+  /** The proof that y (and z) are: { y, z, gain, distance, bound }, or null if they prove nothing. If
+   * the bound is Infinity, there is no solution. Else no solution has a norm below the bound. */
   check_certificate(problem, y, z = undefined) {
     return this.#call(
       "check_certificate",
@@ -389,9 +389,9 @@ export class Fclib {
   }
 
   /**
-   * What a file holds: { problem, solution, guesses, contacts, bodies, left_out }, null where there is
-   * none. The bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind` is of
-   * the problem where there are several. `left_out` says what could not be read beside the problem.
+   * The content of a file: { problem, solution, guesses, contacts, bodies, left_out }. What the file
+   * lacks is null. The bytes are those of an FCLIB file of any version, or of a text of Siconos. If
+   * the file has several problems, `kind` says which one. `left_out` names what could not be read.
    */
   async read(bytes, kind = "") {
     const content = bytes instanceof Uint8Array ? bytes : new Uint8Array(bytes);
@@ -406,7 +406,7 @@ export class Fclib {
     return { problem, solution: null, guesses: [], contacts: null, bodies: null, left_out: [] };
   }
 
-  /** The problem in a text of Siconos; `kind` where its sizes should not decide. */
+  /** The problem in a text of Siconos. If `kind` is given, the sizes do not decide the kind. */
   read_siconos(text, kind = "") {
     return this.#call("read_siconos", text, kind);
   }
@@ -422,7 +422,7 @@ async function bytes_of(url) {
   return answer.arrayBuffer();
 }
 
-/** Loads the core, once; `wasm` are the bytes of fclib-core.wasm, from beside this file otherwise. */
+/** Loads the core, once. `wasm` has the bytes of fclib-core.wasm; without it the file is read. */
 export async function load({ wasm = undefined } = {}) {
   const { default: createCore } = await import("./fclib-core.mjs");
   const wasmBinary = wasm ?? (await bytes_of(new URL("./fclib-core.wasm", import.meta.url)));

@@ -35,7 +35,7 @@ val failure(const char* kind, const std::string& message, const std::string& whe
   return result;
 }
 
-/// What went wrong; undefined where nothing did.
+/// The error of a call; undefined if there was none.
 template <class F>
 val failure_of(const F& run) {
   try {
@@ -57,7 +57,7 @@ val guarded(const F& run) {
   return failed.isUndefined() ? result : failed;
 }
 
-/// Calls visit(problem, block) with the problem of a block, which may have more.
+/// Calls visit(problem, block) with the problem of a block. The block may have more parts.
 template <class Visitor>
 val with_problem(int address, const Visitor& visit) {
   return guarded([&] {
@@ -97,7 +97,7 @@ const char* name_of(ContactStatus status) {
                                           : "slide";
 }
 
-// ---- what there is
+// ---- lists: solvers, fields, options
 
 val value_of(const OptionValue& value) {
   return std::visit([](const auto& v) { return val(v); },
@@ -165,7 +165,7 @@ val describe_fields() {
   return result;
 }
 
-/// The fields of all structs, by the names of these.
+/// The fields of each struct, by the name of the struct.
 val describe_structs() {
   val problems = val::object();
   for_each_formulation([&]<class P>(std::type_identity<P>) {
@@ -444,13 +444,13 @@ int to_numbers(Result&& own) {
   return reinterpret_cast<int>(numbers.data());
 }
 
-/// Another clock, for tests of what looks at it.
+/// Another clock, for tests of code that reads the clock.
 Clock clock_from(const val& clock) {
   if (is_missing(clock)) return {};
   return [clock] { return clock().as<double>(); };
 }
 
-/// The address of the result's numbers; 0 where there is a `failure` instead. The block has a
+/// The address of the result's numbers; 0 if there is a `failure` instead. The block has a
 /// guess; `options`, `clock` and `report` may be undefined.
 int solve_problem(int address, const std::string& solver, double tolerance, bool natural,
                   double max_iterations, double time_limit, bool history, const val& options,
@@ -491,7 +491,7 @@ val certificate_of_solve() { return proof_to_js(answer().result.certificate); }
 
 val history_of_solve() { return history_to_js(*answer().result.history); }
 
-/// A copy of numbers where the core has them.
+/// A copy of numbers that lie in the core's memory.
 val numbers_at(int address, int size) {
   return to_js(reinterpret_cast<const double*>(address), static_cast<std::size_t>(size));
 }

@@ -153,15 +153,15 @@ export interface Options {
 ${options}}
 
 export interface Settings {
-  /** "auto" where it is not given */
+  /** if it is not given: "auto" */
   solver?: SolverName;
   /** bound on Merit.error; 1e-8 */
   tol?: number;
-  /** the solver's own where it is null */
+  /** null: the solver's own limit */
   max_iterations?: number | null;
   /** [s] of the wall clock, conversions included */
   time_limit?: number | null;
-  /** of it r is used */
+  /** only its r is used */
   guess?: Solution | null;
   merit?: "both" | "natural";
   history?: boolean;
@@ -176,7 +176,7 @@ export interface Report {
   /** [s] since the solver started */
   time: number;
   stage: string;
-  /** the iterate, where the solver has it at hand */
+  /** the iterate, if the solver can show it */
   readonly r: Float64Array | undefined;
 }
 

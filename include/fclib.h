@@ -317,10 +317,10 @@ int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* prob
  *            term is ||G^T v + b|| / (1 + ||b||), and there is a third one,
  *            ||M v - H r - G l - f|| / (1 + ||f||).
  *  MERIT_2   the relative error that every tolerance of this library bounds (3.1 returns 0). It is
- *            the largest of ||F|| / ||q||, of the same with rho u^ and rho q, where
- *            rho = 1 / mean |W_kk| (this does not change with the units), and of the errors of the
- *            stored v, u and l, each component relative to its own velocity. What rounding leaves
- *            of the terms does not count.
+ *            the largest of three errors: ||F|| / ||q||; the same with rho u^ for u^ and rho q for
+ *            q, rho = 1 / mean |W_kk|, which does not change with the units; and the errors of the
+ *            stored v, u and l, each component relative to its own velocity. Errors that
+ *            rounding of the terms explains do not count.
  */
 enum FCLIB_APICOMPILE fclib_merit { MERIT_1, MERIT_2 };
 

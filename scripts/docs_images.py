@@ -30,8 +30,8 @@ import fclib
 from fclib import collections, demo, scenes, simulate
 from fclib.bench import Job, Limits, Record, SolverChoice, Store
 from fclib.bench.problems import look
-from fclib.collections import families, known, standing, trajectory
-from fclib.report import Campaigns, build_site, drawn, picture, view_of, write_view
+from fclib.collections import families, ratings, set_index, trajectory
+from fclib.report import Campaigns, build_site, drawings, picture, view_of, write_view
 from fclib.report.solids import solids_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -109,7 +109,7 @@ def figures() -> list[str]:
 
 def shoot(shot: Shot, path: Path) -> None:
     """Write a picture; the scene's own view and focus are those of its class now."""
-    plan = known.plan_of(f"standard/{shot.family}")
+    plan = set_index.plan_of(f"standard/{shot.family}")
     if plan.trajectory is None:
         raise ValueError(f"{shot.family} has no stored states")
     states = trajectory.read(plan.trajectory)
@@ -161,7 +161,7 @@ def problem_of(name: str) -> Any:
         return family.problem(family.problems // 2, 0)
     for own in (f"standard/{name}", f"{families()[name].collection}/{name}"):
         try:
-            plan = known.plan_of(own)
+            plan = set_index.plan_of(own)
         except KeyError:
             continue
         if plan.trajectory is not None:
@@ -193,7 +193,7 @@ def sheet(sets: tuple[str, ...], path: Path) -> None:
             problem = problem_of(name)
             bodies, contacts = problem.bodies, problem.contacts
             if bodies is None or contacts is None or not len(bodies.shape_kind):
-                picture.draw_matrix(drawn.matrix_of(problem), file, TILE)
+                picture.draw_matrix(drawings.matrix_of(problem), file, TILE)
             else:
                 near = contacts.point[(contacts.shape >= 0).all(axis=1)]
                 picture.draw(solids_of(bodies, contacts), file, TILE, near=near)
@@ -211,12 +211,12 @@ def stored_runs(folder: Path, store: Path) -> None:
     """A store of the runs that lie beside the collection's states, of the problems in a folder."""
     files = {}
     for row in collections.read_catalog(folder).to_pylist():
-        files[row["digest"][: standing.DIGITS]] = folder / (row["global_file"] or row["local_file"])
+        files[row["digest"][: ratings.DIGITS]] = folder / (row["global_file"] or row["local_file"])
     facts = {digest: look(path) for digest, path in files.items()}
     methods = {info.name: info.family for info in fclib.solvers()}
-    rows = [run for run in standing.runs() if run.limit is not None and run.digest in facts]
+    rows = [run for run in ratings.runs() if run.limit is not None and run.digest in facts]
     # of several versions of a solver the last one
-    last = {(run.digest, run.solver): run for run in sorted(rows, key=standing.when)}
+    last = {(run.digest, run.solver): run for run in sorted(rows, key=ratings.when)}
     with Store(store) as target:
         for run in last.values():
             # without their version: a solver that ran again after a change would count as two
@@ -230,12 +230,12 @@ def stored_runs(folder: Path, store: Path) -> None:
                 merits=None if run.error is None else {"error": run.error},
                 machine={"node": "stored runs"},
             )
-            target.add(Job(facts[run.digest], choice, standing.TOLERANCE, limits, 0, 1), record)
+            target.add(Job(facts[run.digest], choice, ratings.TOLERANCE, limits, 0, 1), record)
 
 
 def report(folder: Path) -> Path:
     """A report of all stored runs; its folder."""
-    plans = [known.plan_of(name) for name in known.sets()["standard"]]
+    plans = [set_index.plan_of(name) for name in set_index.sets()["standard"]]
     bare = [replace(p, references=p.name == SHOWN.rpartition("/")[0]) for p in plans]
     collections.build(bare, folder / "collection", pictures=False)
     stored_runs(folder / "collection", folder / "runs.sqlite")

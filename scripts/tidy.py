@@ -46,11 +46,11 @@ def main() -> None:
         )
     wrong = 0
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        for source, said in zip(
+        for source, findings in zip(
             sources, pool.map(lambda one: check(build, one), sources), strict=True
         ):
-            wrong += bool(said)
-            print(f"{source.relative_to(ROOT)}{': ' if said else ''}{said}", flush=True)
+            wrong += bool(findings)
+            print(f"{source.relative_to(ROOT)}{': ' if findings else ''}{findings}", flush=True)
     sys.exit(f"{wrong} of {len(sources)} files have findings" if wrong else 0)
 
 

@@ -20,11 +20,11 @@ CoreOf<C> problem_as_given(const C& c);
 template <class C>
 ProblemView view_as_given(const C& c);
 
-/// Like problem_as_given(), but without the room that nzmax leaves: for callers that validate it.
+/// Like problem_as_given(), but without the unused entries that nzmax counts. Callers validate it.
 template <class C>
 CoreOf<C> problem_of(const C& c);
 
-/// ... and it is valid.
+/// The same, validated. Throws Error if it is not valid.
 template <class C>
 CoreOf<C> valid_problem(const C& c);
 

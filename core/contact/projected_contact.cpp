@@ -30,9 +30,9 @@ void ProjectedContact<Cone>::solve(const Vec& b, double accuracy, int max_iterat
       if (ratio <= contraction) break;
       rho_ *= reduction;
     }
-    const bool settled = change <= accuracy * r.norm();
+    const bool converged = change <= accuracy * r.norm();
     r = next;
-    if (settled) return;
+    if (converged) return;
     hat = next_hat;
     if (ratio < 0.3) rho_ *= growth;
   }

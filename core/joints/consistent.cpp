@@ -153,13 +153,13 @@ std::optional<ConsistentJoints> consistent_joints(const GlobalProblem& problem) 
     while (idle < size && eigen.eigenvalues()[idle] <= unit * unit) ++idle;
     if (idle == 0) continue;
     const Eigen::MatrixXd z = eigen.eigenvectors().leftCols(idle);
-    const Vector said = z.transpose() * scaled_b;
+    const Vector contradiction = z.transpose() * scaled_b;
     const Vector terms = z.cwiseAbs().transpose() * scaled_b.cwiseAbs();
-    if (!(said.array().abs() > agreement * terms.array()).any()) continue;
+    if (!(contradiction.array().abs() > agreement * terms.array()).any()) continue;
     const double explained = unit * (felt(g, rows, inertia, velocity) + scaled_b.norm());
-    if (!(said.norm() <= explained)) return std::nullopt;
+    if (!(contradiction.norm() <= explained)) return std::nullopt;
     contradicts = true;
-    const Vector moved = length.cwiseProduct(z * said);
+    const Vector moved = length.cwiseProduct(z * contradiction);
     std::vector<Eigen::Triplet<double, Index>> entries;
     const Eigen::MatrixXd back = length.asDiagonal() * z;           // E^-1 Z
     const Eigen::MatrixXd along = inverse.asDiagonal() * z;         // E Z

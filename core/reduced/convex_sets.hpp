@@ -62,13 +62,13 @@ class Cones {
       const Vec slope = c.block * y + b;
       const Vec next = cone.project(y - slope / c.whole);
       const Vec change = next - r;
-      const bool settled = change.squaredNorm() <= 1e-12 * next.squaredNorm();
+      const bool converged = change.squaredNorm() <= 1e-12 * next.squaredNorm();
       const double grown = 0.5 * (1 + std::sqrt(1 + 4 * theta * theta));
       const bool restart = slope.dot(change) > 0;
       y = restart ? next : Vec(next + ((theta - 1) / grown) * change);
       theta = restart ? 1 : grown;
       r = next;
-      if (settled) return;
+      if (converged) return;
     }
   }
 

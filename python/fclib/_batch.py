@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._same import Same
+from fclib._equality import EqualByEntries
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class BatchResult(Same):
+class BatchResult(EqualByEntries):
     """What ``fclib.solve_batch`` returns: arrays over the problems. Equal if the arrays are.
 
     Attributes:

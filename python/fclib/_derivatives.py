@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._same import Same
+from fclib._equality import EqualByEntries
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Smooth: TypeAlias = _core.LocalProblem | _core.GlobalProblem
@@ -33,7 +33,7 @@ RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Tangent(Same):
+class Tangent(EqualByEntries):
     """What ``fclib.jvp`` returns: the change of the solution. Equal if the arrays are.
 
     Attributes:
@@ -56,7 +56,7 @@ class Tangent(Same):
 
 
 @dataclass(frozen=True, eq=False)
-class Gradient(Same):
+class Gradient(EqualByEntries):
     """What ``fclib.vjp`` returns: the derivative by each datum, in its shape.
 
     Derivatives by data of the other formulation are None. The entries of a matrix are treated as

@@ -13,7 +13,6 @@ import inspect
 import math
 import types
 import typing
-import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -21,8 +20,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
-from fclib._meant import nearest
+from fclib import _core, _entry_points
+from fclib._suggest import nearest
 
 GROUP = "fclib.solvers"
 SolverError = _core.SolverError
@@ -227,27 +226,13 @@ def register(info: _core.SolverInfo) -> None:
 
 
 @functools.cache
-def entry_points_there() -> tuple[Any, ...]:
-    """The entry points of all packages that are installed, by name, none of them loaded."""
-    from importlib.metadata import entry_points
-
-    return tuple(sorted(entry_points(group=GROUP), key=lambda point: point.name))
-
-
-@functools.cache
 def _providers() -> tuple[Provider, ...]:
     """Load the entry points, once. One that cannot be loaded is reported, and left out."""
-    providers = []
-    for point in entry_points_there():
-        try:
-            loaded = point.load()
-        except Exception as error:
-            message = f"entry point {point.name} of {GROUP} cannot be loaded: {error!r}"
-            warnings.warn(message, RuntimeWarning, stacklevel=3)
-            continue
-        if hasattr(loaded, "find") and hasattr(loaded, "solvers"):
-            providers.append(loaded)
-    return tuple(providers)
+    return tuple(
+        found
+        for _, found in _entry_points.loaded(GROUP)
+        if hasattr(found, "find") and hasattr(found, "solvers")
+    )
 
 
 def solvers() -> list[_core.SolverInfo]:

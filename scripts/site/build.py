@@ -57,7 +57,7 @@ MENU = {
         "recorders",
     ],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
-    "The bench": ["bench", "measurement", "published-runs", "report"],
+    "The bench": ["bench", "one-run", "measurement", "published-runs", "report"],
     "Interfaces": [
         "command-line",
         "python",
@@ -74,6 +74,7 @@ MENU = {
         "citing",
         "stability",
         "architecture",
+        "decisions",
         "contributing",
         "testing",
         "security",

@@ -11,8 +11,8 @@ from typing import Any
 
 from fclib import scenes, simulate
 from fclib.collections import plan
-from fclib.collections.known import KNOWN, distinct_of
 from fclib.collections.references import TARGET
+from fclib.collections.set_index import SETS, distinct_of
 
 SIZE = (720, 540)  # of a picture [pixels]
 Kind = type[scenes.Described]
@@ -24,7 +24,7 @@ def pages(draws: bool, report: str = "") -> Iterator[tuple[str, str | bytes]]:
     `report` is the address of a report, for links to it.
     """
     known = plan.families()
-    order = {name: place for place, name in enumerate(KNOWN)}
+    order = {name: place for place, name in enumerate(SETS)}
     by_set = sorted(known, key=lambda name: (order.get(known[name].collection, 99), name))
     drawn = set()
     for name in by_set:
@@ -49,7 +49,7 @@ def index(families: dict[str, Kind], drawn: set[str], report: str) -> str:
         "| set | version | what |",
         "|---|---|---|",
     ]
-    lines += [f"| {name} | {version} | {what} |" for name, (version, what) in KNOWN.items()]
+    lines += [f"| {name} | {version} | {what} |" for name, (version, what) in SETS.items()]
     lines += ["", "| | set | family | problems | distinct | what |", "|---|---|---|---:|---:|---|"]
     lines += [
         f"| {f'![{name}]({name}.png){{width=96px}}' if name in drawn else ''}"

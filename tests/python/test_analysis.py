@@ -218,7 +218,7 @@ def test_a_body_between_closing_walls(d: int, mu: float, others: int) -> None:
     assert_no_solution(problem, found.certificate)
     assert found.record["certificate_contacts"] == [0, 1]
     # of the local form alone, and without the solver's own proof
-    data = Data.of(problem.condense())
+    data = Data.of_problem(problem.condense())
     assert_no_solution(problem, _existence.prove(data))
 
 
@@ -387,7 +387,7 @@ def test_planted_problems_are_never_called_infeasible(
     for case in (planted_local(seed, d, nc, p, mu), planted_global(seed, d, nc, p, mu)):
         found = analysis.analyze(case.problem)
         assert found.existence.verdict == analysis.EXISTS_SLATER
-        assert _existence.prove(Data.of(case.problem)) is None
+        assert _existence.prove(Data.of_problem(case.problem)) is None
 
 
 @some
@@ -417,7 +417,7 @@ def test_hyperstatic_problems_are_never_called_infeasible(
         found = analysis.analyze(form, time_limit=2)
         assert found.existence.verdict != analysis.PROVEN_NOT
         assert found.hyperstaticity == 3 * (nc + duplicated) - np.linalg.matrix_rank(H)
-        assert _existence.prove(Data.of(form)) is None
+        assert _existence.prove(Data.of_problem(form)) is None
 
 
 @pytest.mark.parametrize("local", [False, True])

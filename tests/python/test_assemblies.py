@@ -15,7 +15,7 @@ from scipy.spatial.distance import pdist
 
 import fclib
 from fclib import scenes
-from fclib.collections import known
+from fclib.collections import set_index
 from fclib.scenes import Assembled
 from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
@@ -168,7 +168,9 @@ def test_nonsense_is_refused(name: str, value: float) -> None:
         FAMILIES["Wall"](**{name: value})
 
 
-LISTED = [c for name in ("standard", "hard") for c in known.choices(name) if c.family in FAMILIES]
+LISTED = [
+    c for name in ("standard", "hard") for c in set_index.choices(name) if c.family in FAMILIES
+]
 OLDER_PROCESSOR = """
 import json, sys, warnings
 warnings.simplefilter("ignore")  # of a NumPy that knows some of these features by other names

@@ -866,7 +866,7 @@ def test_a_worker_that_is_killed_from_outside_is_no_failure(
         while not (begun := first_of(supervisor, before)):
             time.sleep(0.01)
         os.kill(begun, signal.SIGKILL)
-        record = supervisor.take()[1]
+        record = supervisor.collect()[1]
         assert (record.status, record.ran) == ("killed", False), record
 
 
@@ -982,7 +982,7 @@ def test_a_supervisor_that_is_killed_is_replaced(
     supervisor.give(job(folder, "sleeps"))
     assert supervisor.process is not None
     supervisor.process.kill()
-    _, record = supervisor.take()
+    _, record = supervisor.collect()
     assert (record.status, record.ran) == ("lost", False)
     assert "SIGKILL" in record.message
     assert supervisor.do(job(folder, "auto")).status == "converged"
@@ -1147,7 +1147,7 @@ from pathlib import Path
 supervisor = pool.SupervisorClient(1)
 supervisor.give(job(Path(sys.argv[1]), "bad-sleeps", wall=1000.0))
 print(supervisor.process.pid, supervisor.mark, flush=True)
-supervisor.take()
+supervisor.collect()
 """
 
 

@@ -317,7 +317,7 @@ def test_some_solvers_share_the_instances_that_all_of_them_have_run() -> None:
 
 
 def test_a_part_has_the_instances_it_is_of() -> None:
-    part = profiles.costs([row("A", k, k + 1.0) for k in range(3)]).of([2, 0])
+    part = profiles.costs([row("A", k, k + 1.0) for k in range(3)]).on_instances([2, 0])
     assert [instance.problem for instance in part.instances] == ["problem2", "problem0"]
     assert part.values.tolist() == [[3], [1]]
 

@@ -78,9 +78,9 @@ def test_a_step_waits_for_the_one_before_it() -> None:
     assert next(jobs) is first
     assert next(jobs).key == "alone"
     assert list(jobs) == []
-    jobs.settle(first)
+    jobs.finish(first)
     assert [each.key for each in jobs] == ["2"]
-    jobs.settle(second)
+    jobs.finish(second)
     assert [each.key for each in jobs] == ["3"]
 
 

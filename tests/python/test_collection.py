@@ -29,10 +29,10 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog, known, published, references, standing
+from fclib.collections import archives, catalog, published, ratings, references, set_index
 from fclib.collections.build import BuildError
-from fclib.collections.known import DATA
 from fclib.collections.plan import Plan
+from fclib.collections.set_index import DATA
 from fclib.simulate import control_of
 
 FAMILIES = collections.families()
@@ -430,7 +430,7 @@ def test_a_solution_that_somebody_sent_in_is_taken(
     }
     said = {"by": "somebody", "date": "2026-01-02"}
     stored = {digest: (solution, said) for digest, solution in known.items()}
-    monkeypatch.setattr(standing, "stored_solution", stored.get)
+    monkeypatch.setattr(ratings, "stored_solution", stored.get)
     folder = unsolved(tmp_path, monkeypatch)
     second, third = collections.read_catalog(folder).to_pylist()
     assert (second["solver"], second["has_solution"]) == ("somebody", True)
@@ -919,7 +919,7 @@ def test_a_set_counts_its_families_without_states_too() -> None:
 
 def test_copies_are_counted_once() -> None:
     """A tower that rests is one problem, however many steps it does so."""
-    states = published.digests("rt444/KaplasTower", known.version_of("rt444/KaplasTower"))
+    states = published.digests("rt444/KaplasTower", set_index.version_of("rt444/KaplasTower"))
     if not states:
         pytest.skip("its states are not stored here")
     rows = [json.loads(one) for one in invoke("collection", "list", "--json").output.splitlines()]

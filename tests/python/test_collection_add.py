@@ -15,7 +15,7 @@ pytest.importorskip("pyarrow")
 
 from fclib import collections
 from fclib.collections import catalog
-from fclib.collections.known import DATA
+from fclib.collections.set_index import DATA
 
 # what they give is of one kind here
 read: Any = fclib.read

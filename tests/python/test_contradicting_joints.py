@@ -101,7 +101,7 @@ def test_a_velocity_that_the_joints_do_not_allow_is_no_witness(
         b=[-1.0, -1.0 + 1e-3],  # v = (1, -100, .)
         mu=[0.5],
     )
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     joints = joints_of(data)
     assert joints.certain
     A, c = data.matrices["H"].T.tocsr(), problem.w
@@ -116,14 +116,14 @@ def test_a_velocity_that_the_joints_do_not_allow_is_no_witness(
 
 def test_rows_beyond_the_time_are_undecided() -> None:
     case = planted(list(KINDS).index("combined"))
-    found = joints_of(Data.of(case.problem), time_limit=0.0)
+    found = joints_of(Data.of_problem(case.problem), time_limit=0.0)
     assert found.agree is None
     assert "no time was left" in found.reason
 
 
 def test_the_combination_is_exact() -> None:
     case = planted(list(KINDS).index("equal"))
-    joints = joints_of(Data.of(case.problem))
+    joints = joints_of(Data.of_problem(case.problem))
     assert joints.agree is False
     G = dense(case.problem.G)
     for row in G:

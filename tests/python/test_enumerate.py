@@ -634,7 +634,7 @@ def test_the_contacts_of_a_solution_never_contradict_all_states(seed: int) -> No
             if not error <= 1e-8:
                 continue
             velocity = "unique" if states.velocity_unique else "undecided"
-            said = reactions(Data.of(problem), velocity, False, None, solution, error, 100)
+            said = reactions(Data.of_problem(problem), velocity, False, None, solution, error, 100)
             exact = states.reaction_unique
             assert said.known is None or exact is None or said.known == exact, said.reason
             seen[said.verdict, exact] += 1

@@ -380,7 +380,7 @@ def test_a_program_may_write_into_its_input(tmp_path: Path) -> None:
     assert "converged" in run.stdout
 
 
-def alive(pid: int) -> bool:
+def is_running(pid: int) -> bool:
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -400,9 +400,9 @@ def test_a_program_that_takes_too_long_is_killed_with_its_children(tmp_path: Pat
     assert not result.solution.r.any()
     pid = int((tmp_path / "pid").read_text())
     end = time.monotonic() + 60
-    while alive(pid) and time.monotonic() < end:
+    while is_running(pid) and time.monotonic() < end:
         time.sleep(0.01)
-    assert not alive(pid)
+    assert not is_running(pid)
 
 
 @pytest.mark.parametrize(
@@ -616,7 +616,7 @@ def test_the_worker_of_siconos_is_kept_and_is_killed_at_the_limit() -> None:
     assert time.monotonic() - start < 300
     assert result.status == "time_limit"
     assert result.cpu_s > 0.01
-    assert not alive(first)
+    assert not is_running(first)
     assert fclib.solve(problem_of(), "siconos:nsgs").converged
 
 

@@ -83,7 +83,7 @@ def stolen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     )
     library = source.with_suffix(".so")
     subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
-    monkeypatch.setattr("fclib.collections.standing.write", lambda rows: tmp_path)
+    monkeypatch.setattr("fclib.collections.ratings.write", lambda rows: tmp_path)
     yield f"plugin:{library}"
     assert not mark.exists()
 
@@ -105,7 +105,7 @@ def test_no_command_asks_for_a_solver_that_a_store_names(
     store = store_of(tmp_path / "runs.sqlite", SolverChoice("nsgs", {}))
     monkeypatch.setattr(_registry, "find_solver", asked)
     monkeypatch.setattr(_core, "find_solver", asked)
-    monkeypatch.setattr("fclib.collections.standing.write", lambda rows: tmp_path)
+    monkeypatch.setattr("fclib.collections.ratings.write", lambda rows: tmp_path)
     for command in commands_on(store, tmp_path):
         helpers_cli.run(*command)
 

@@ -942,8 +942,10 @@ def test_mujocos_reaction_gives_its_next_velocity(
     for _ in range(200):
         step = recorders.mujoco(model, data)
         assert step.guess is not None
+        assert step.mismatch is not None
         assert step.mismatch < 1e-12
-        contacts = max(contacts, len(step.contacts))  # type: ignore[arg-type]
+        assert step.contacts is not None
+        contacts = max(contacts, len(step.contacts))
         r = step.guess.r.reshape(-1, 3)
         assert (r[:, 0] >= 0).all()
         if cone == "elliptic":  # the corners of a pyramid are outside of the cone

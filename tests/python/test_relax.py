@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fclib import collections, scenes
-from fclib.collections import known, published, trajectory
+from fclib.collections import published, set_index, trajectory
 
 pytest.importorskip("mujoco")
 
@@ -155,7 +155,7 @@ def test_states_are_relaxed_before_they_are_stored(tmp_path: Path) -> None:
 def test_newest_versions_of_chosen_sets_say_how_deep_they_may_be() -> None:
     """Of the families whose older states were deeper."""
     for folder in ("standard/Chute", "standard/Chute4000", "tiny/RollingDiscs"):
-        path = published.path_of(folder, known.version_of(folder))
+        path = published.path_of(folder, set_index.version_of(folder))
         if path is None:
             pytest.skip("collection/ is not here: a source distribution")
         assert trajectory.read_origin(path)[1]["settings"]["deepest"] == BOUND

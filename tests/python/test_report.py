@@ -21,7 +21,7 @@ import fclib
 from fclib._geometry import rotations
 from fclib.bench import Store, profiles
 from fclib.cli import app
-from fclib.collections import known
+from fclib.collections import set_index
 from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
 from fclib.report.libraries import as_script
 from fclib.report.network import network_of
@@ -389,7 +389,7 @@ def families(assembled: bool) -> list[str]:
     recorded has the order of their unknowns, and a test of its own (test_simulators.py).
     """
     found: dict[str, str] = {}
-    for own in (*known.sets()["standard"], *known.sets()["extended"]):
+    for own in (*set_index.sets()["standard"], *set_index.sets()["extended"]):
         found.setdefault(own.partition("/")[2], own)
     del found["Chute4000"]
     found = {name: own for name, own in found.items() if not own.startswith("simulators/")}
@@ -406,7 +406,7 @@ def a_problem(own: str) -> tuple[Any, Any, Any]:
     from fclib import scenes, simulate
     from fclib.collections import trajectory
 
-    plan = known.plan_of(own)
+    plan = set_index.plan_of(own)
     if plan.trajectory is not None:
         states = trajectory.read(plan.trajectory)
         return states.problem(0).problem, states.model, states.position[0]
@@ -463,7 +463,7 @@ def test_drawn_positions_of_assembled_families_are_those_of_their_equations(fami
     These families have no simulation: H is what their problems are. A body's own axes turn the
     moments, and leave their sizes.
     """
-    plan = known.plan_of(family)
+    plan = set_index.plan_of(family)
     assert isinstance(plan.scene, Assembled)
     problem: Any = plan.scene.problem((plan.chosen or (0,))[0])
     network = network_of(problem)

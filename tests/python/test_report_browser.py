@@ -15,7 +15,7 @@ import pytest
 
 import fclib
 from fclib.bench import profiles
-from fclib.collections import known, trajectory
+from fclib.collections import set_index, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers_browser import chromium
 from helpers_report import (
@@ -467,7 +467,7 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
 def test_a_long_thin_scene_begins_near_its_middle(browser: Any, tmp_path: Path) -> None:
     distances = {}
     for family in ("Chain", "Arch"):
-        stored = known.plan_of(f"standard/{family}").trajectory
+        stored = set_index.plan_of(f"standard/{family}").trajectory
         assert stored is not None
         target = tmp_path / f"{family}.html"
         write_view(view_of(trajectory.read(stored).problem(0).problem), target)
@@ -687,13 +687,13 @@ def test_charts_have_these_buttons_and_no_others(go: Opener) -> None:
 
 def test_the_browser_draws_what_the_files_say(go: Opener) -> None:
     """Corners of shapes of all kinds, as Python has them."""
-    from fclib.collections import known, trajectory
+    from fclib.collections import set_index, trajectory
     from fclib.report.solids import record_of, solids_of
 
     page = go("#/about")
     kinds = set()
     for family in ("Chute", "Carrier", "Humanoid"):
-        path = known.plan_of(f"standard/{family}").trajectory
+        path = set_index.plan_of(f"standard/{family}").trajectory
         assert path is not None
         problem: Any = trajectory.read(path).problem(0).problem
         solids = solids_of(problem.bodies, problem.contacts)

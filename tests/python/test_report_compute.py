@@ -493,11 +493,11 @@ def test_files_of_libfclib_3_1_and_texts_are_seen_and_solved(page: Any, tmp_path
 @pytest.mark.slow
 def test_a_file_is_drawn_where_python_draws_it(page: Any, tmp_path: Path) -> None:
     """Shapes of all kinds and contact points, of a periodic cell too, from the bytes of a file."""
-    from fclib.collections import known, trajectory
+    from fclib.collections import set_index, trajectory
 
     problems: dict[str, Any] = {}
     for family in ("Chute", "Carrier", "Humanoid", "PeriodicBox"):
-        plan = known.plan_of(f"standard/{family}")
+        plan = set_index.plan_of(f"standard/{family}")
         assert plan is not None
         assert plan.trajectory is not None
         problems[family] = trajectory.read(plan.trajectory).problem(0).problem

@@ -226,7 +226,7 @@ def part_of(costs: profiles.Costs, family: str) -> profiles.Costs:
               for a, b in zip(rounded(costs.values, DIGITS), costs.values.tolist(),
                               strict=True)]  # fmt: skip
     whole = dataclasses.replace(costs, values=np.array(values, float))
-    return whole.of(
+    return whole.on_instances(
         k for k, one in enumerate(costs.instances) if not family or one.family == family
     )
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fclib.collections import known, trajectory
+from fclib.collections import set_index, trajectory
 from fclib.report import build_site, picture
 from fclib.report.solids import Solids, solids_of, unit
 from helpers_report import read_data, skip_without_libraries
@@ -90,7 +90,7 @@ def test_triangles_are_cut_and_cover_the_same() -> None:
 
 @pytest.mark.parametrize(("family", "least"), [("BoxesStack", 0.2), ("Chain", 0.05)])
 def test_a_long_thin_scene_is_shown_large(family: str, least: float, tmp_path: Path) -> None:
-    stored = known.plan_of(f"standard/{family}").trajectory
+    stored = set_index.plan_of(f"standard/{family}").trajectory
     assert stored is not None
     states = trajectory.read(stored)
     problem: Any = states.problem(0).problem
@@ -110,7 +110,7 @@ def test_every_problem_has_a_small_picture(tmp_path: Path) -> None:
 
     plans = []
     for name in ("Arch", "ManySolutions", "LocalProblems"):
-        plan = known.plan_of(f"standard/{name}")
+        plan = set_index.plan_of(f"standard/{name}")
         plans.append(plan.only([int(plan.numbers()[0])]))
     collections.build(plans, tmp_path / "collection", pictures=False)
     build_site(None, tmp_path / "site", tmp_path / "collection", views=0)

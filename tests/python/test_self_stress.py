@@ -25,7 +25,7 @@ def judged(data: Data) -> analysis.SelfStress:
 
 
 def verdict(problem: fclib.Problem) -> analysis.SelfStress:
-    return judged(Data.of(problem))
+    return judged(Data.of_problem(problem))
 
 
 def walls(gap: float = 0.0, friction: float = 0.5) -> fclib.GlobalProblem:
@@ -77,7 +77,7 @@ def test_packings_of_few_bodies_are_prestressed_and_larger_ones_solvable() -> No
     assert np.linalg.norm(solution.r) <= free.bound
     # it carries its proof: the velocity is inside K*, contact by contact
     assert free.vector is not None
-    assert Data.of(large).dual_margin(large.H.T @ free.vector + large.w).min() > 0
+    assert Data.of_problem(large).dual_margin(large.H.T @ free.vector + large.w).min() > 0
 
 
 def test_joints_and_local_problems() -> None:
@@ -99,7 +99,7 @@ def test_joints_and_local_problems() -> None:
 
 
 def test_a_velocity_that_is_not_inside_proves_nothing() -> None:
-    data = Data.of(walls(1.0))
+    data = Data.of_problem(walls(1.0))
     for witness in (np.zeros(3), np.array([-0.5, 0.3, 0.0]), np.array([1.1, 0.0, 0.0])):
         forged = Slater(True, 1.0, np.ones(6), "forged", witness=witness)
         found = self_stress(data, joints_of(data), forged)
@@ -120,7 +120,7 @@ def test_a_part_that_is_next_to_nothing_may_have_other_solutions() -> None:
     states = analysis.enumerate_solutions(problem)
     sizes = sorted(float(np.linalg.norm(np.array(one.r, float))) for one in states.isolated)
     assert len(sizes) == 2
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     found = judged(data)
     assert found.verdict == "solvable"
     assert sizes[0] <= found.bound < found.far <= sizes[1]

@@ -19,13 +19,13 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import catalog, known
+from fclib.collections import catalog, set_index
 from fclib.collections.plan import Plan
 from fclib.scenes.local_problems import LocalProblems
 from workshop.sets import choose
 from workshop.sets.__main__ import app as lists
 
-TINY = known.DATA / "tiny"
+TINY = set_index.DATA / "tiny"
 FILES = sorted(TINY.glob("*/*.hdf5"))
 
 
@@ -39,7 +39,7 @@ def invoke(*arguments: object) -> Any:
 def test_every_family_is_in_a_set_that_is_known() -> None:
     sets = collections.sets()
     for name, family in collections.families().items():
-        assert family.collection in known.KNOWN, name
+        assert family.collection in set_index.SETS, name
         assert f"{family.collection}/{name}" in sets[family.collection]
         assert f"{family.collection}/{name}" in sets["extended"] + sets["rt444"] + sets["ladder"]
 
@@ -53,14 +53,14 @@ def test_versions_are_in_list_plan_and_catalogue() -> None:
     plan = collections.plan_of("rt444/Chain")
     assert (plan.version, plan.problems) == (collections.version("rt444"), 1514)
     assert json.loads(plan.fingerprint())["version"] == plan.version
-    for row in collections.read_catalog(known.DATA).to_pylist():
-        assert row["version"] == known.version_of(f"tiny/{row['family']}")
+    for row in collections.read_catalog(set_index.DATA).to_pylist():
+        assert row["version"] == set_index.version_of(f"tiny/{row['family']}")
 
 
 def test_set_is_shown_with_its_problems() -> None:
     shown = invoke("collection", "show", "tiny")
     assert shown.exit_code == 0
-    for choice in known.choices("tiny"):
+    for choice in set_index.choices("tiny"):
         assert choice.family in shown.output
     assert "rt444/Chain" in invoke("collection", "show", "rt444").output
 
@@ -86,7 +86,7 @@ def test_family_of_local_problems_is_built_with_its_figure(tmp_path: Path) -> No
 
 def test_older_catalogue_without_version_is_read(tmp_path: Path) -> None:
     pa = catalog.arrow()
-    table = collections.read_catalog(known.DATA).drop_columns(["version"])
+    table = collections.read_catalog(set_index.DATA).drop_columns(["version"])
     pa.parquet.write_table(table, tmp_path / catalog.FILE)
     assert collections.read_catalog(tmp_path)["version"].to_pylist() == [None] * table.num_rows
 
@@ -104,11 +104,11 @@ def test_tiny_has_every_kind_and_is_small() -> None:
 
 
 def test_tiny_is_as_its_catalogue_says() -> None:
-    verdicts = list(collections.verify(known.DATA))
+    verdicts = list(collections.verify(set_index.DATA))
     assert len(verdicts) == len(FILES)
     assert all(verdict.ok for verdict in verdicts)
-    rows = collections.read_catalog(known.DATA).to_pylist()
-    assert {known.origin_of(row) for row in rows} == {"published"}
+    rows = collections.read_catalog(set_index.DATA).to_pylist()
+    assert {set_index.origin_of(row) for row in rows} == {"published"}
     assert [row["error"] <= 1e-8 for row in rows] == [True] * len(choose.TINY)
 
 
@@ -168,8 +168,8 @@ def test_tiny_is_regenerated(tmp_path: Path) -> None:
 
 def test_tiny_list_is_what_the_command_writes(tmp_path: Path) -> None:
     """For a part of it, since the rest is regenerated above."""
-    listed = {choice.family: choice for choice in known.choices("tiny")}
-    assert [choice.family for choice in known.choices("tiny")] == [
+    listed = {choice.family: choice for choice in set_index.choices("tiny")}
+    assert [choice.family for choice in set_index.choices("tiny")] == [
         family for family, *_ in choose.TINY
     ]
     for family, parameters, number in choose.TINY:
@@ -179,7 +179,7 @@ def test_tiny_list_is_what_the_command_writes(tmp_path: Path) -> None:
             assert choose.choice_of(family, parameters, 0, number) == listed[family]
     path = tmp_path / "list.json"
     choose.write_list(path, listed.values(), {"kinds": len(listed)})
-    assert path.read_text() == (known.DATA / "tiny.json").read_text()
+    assert path.read_text() == (set_index.DATA / "tiny.json").read_text()
 
 
 # ---- hard
@@ -191,7 +191,7 @@ def run_of(row: dict[str, Any], solver: str, solved: bool, **more: Any) -> dict[
 
 
 def test_hard_is_what_most_solvers_fail_on() -> None:
-    rows = {row["family"]: row for row in collections.read_catalog(known.DATA).to_pylist()}
+    rows = {row["family"]: row for row in collections.read_catalog(set_index.DATA).to_pylist()}
     capsules, kaplas, wall = rows["Capsules"], rows["KaplasTower"], rows["Wall"]
     runs = [run_of(kaplas, name, name == "a") for name in "abc"]
     runs += [run_of(capsules, name, name != "a") for name in "abc"]
@@ -201,14 +201,16 @@ def test_hard_is_what_most_solvers_fail_on() -> None:
     # what does not count: another tolerance, no problem of these, one that not all were run on
     runs += [run_of(capsules, name, False, tol=1e-4) for name in "abc"]
     runs += [run_of(capsules, "d", False, hash=""), run_of(rows["FourBar"], "a", False)]
-    chosen = choose.hard(runs, known.DATA)
+    chosen = choose.hard(runs, set_index.DATA)
     assert [choice.family for choice in chosen] == ["KaplasTower", "Wall"]
-    listed = {choice.family: choice for choice in known.choices("tiny")}
+    listed = {choice.family: choice for choice in set_index.choices("tiny")}
     # the files say the parameters of their scenes
     assert chosen == [listed["KaplasTower"], listed["Wall"]]
-    assert [choice.family for choice in choose.hard(runs, known.DATA, share=0.6)] == ["KaplasTower"]
+    assert [choice.family for choice in choose.hard(runs, set_index.DATA, share=0.6)] == [
+        "KaplasTower"
+    ]
     with pytest.raises(ValueError, match="no problem that all solvers were run on at 1e-12"):
-        choose.hard(runs, known.DATA, tol=1e-12)
+        choose.hard(runs, set_index.DATA, tol=1e-12)
 
 
 def test_hard_is_chosen_from_a_store_and_built(
@@ -223,12 +225,12 @@ def test_hard_is_chosen_from_a_store_and_built(
         *("--tol", 1e-8, "--time-limit", 5, "--store", store),
     )
     assert done.exit_code in (0, 1), done.output
-    args = ["hard", store, "--in", known.DATA, "--out", data / "hard.json"]
+    args = ["hard", store, "--in", set_index.DATA, "--out", data / "hard.json"]
     assert CliRunner().invoke(lists, [str(word) for word in args]).exit_code == 0
     rule = json.loads((data / "hard.json").read_text())["rule"]
     assert rule["time_limits"] == [5.0]
-    monkeypatch.setattr(known, "DATA", data)
-    known.choices.cache_clear()
+    monkeypatch.setattr(set_index, "DATA", data)
+    set_index.choices.cache_clear()
     try:
         assert collections.folders(["hard"]) == ["hard/Wall"]
         done = invoke("collection", "build", "hard", "--out", tmp_path / "built", "--no-pictures")
@@ -236,26 +238,26 @@ def test_hard_is_chosen_from_a_store_and_built(
         assert "differ" not in done.output
         row = collections.read_catalog(tmp_path / "built").to_pylist()[0]
         assert (row["id"], row["version"]) == ("hard/Wall/0003", collections.version("hard"))
-        assert known.origin_of(row) == "published"
-        assert known.origin_of({**row, "digest": "0"}) == "differs"
-        assert known.origin_of({**row, "version": "0"}) == "yours"
+        assert set_index.origin_of(row) == "published"
+        assert set_index.origin_of({**row, "digest": "0"}) == "differs"
+        assert set_index.origin_of({**row, "version": "0"}) == "yours"
     finally:
-        known.choices.cache_clear()
+        set_index.choices.cache_clear()
 
 
 def test_two_scenes_of_one_name_in_a_list_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    wall = next(c for c in known.choices("tiny") if c.family == "Wall")
-    other = known.Choice("Wall", {**wall.parameters, "mu": 0.1}, 0, 1, 1, "")
+    wall = next(c for c in set_index.choices("tiny") if c.family == "Wall")
+    other = set_index.Choice("Wall", {**wall.parameters, "mu": 0.1}, 0, 1, 1, "")
     choose.write_list(tmp_path / "odd.json", [wall, other], {})
-    monkeypatch.setattr(known, "DATA", tmp_path)
-    known.choices.cache_clear()
+    monkeypatch.setattr(set_index, "DATA", tmp_path)
+    set_index.choices.cache_clear()
     try:
         with pytest.raises(ValueError, match=r"odd/Wall: the list odd\.json has two scenes"):
             collections.plan_of("odd/Wall")
     finally:
-        known.choices.cache_clear()
+        set_index.choices.cache_clear()
 
 
 # ---- local
@@ -278,7 +280,7 @@ def test_one_contact_of_a_problem_has_its_solution() -> None:
 
 def test_hardest_contacts_are_found_again(tmp_path: Path) -> None:
     settings: Any = {"per_family": 2, "spins": 40, "asymmetric": 3}
-    found = choose.local(known.DATA, **settings)
+    found = choose.local(set_index.DATA, **settings)
     families = {contact.origin.split("/")[1] for contact in found[:-3]}
     assert families == {family for family, *_ in choose.TINY} - {"LocalProblems"}
     for contact in found[-3:]:
@@ -341,7 +343,7 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "rr9118",
     }
     families = {tuple(origin.split("/")[:2]) for origin in origins}
-    assert {name for name, _ in families} >= {"ladder", "rt444", *known.EXTENDED} - later
+    assert {name for name, _ in families} >= {"ladder", "rt444", *set_index.EXTENDED} - later
     assert len(families) >= 30
     for name, family in families:
         assert sum(origin.startswith(f"{name}/{family}/") for origin in origins) <= 4

@@ -13,7 +13,7 @@ import pytest
 import fclib
 from fclib import collections, recorders, scenes
 from fclib.collections import catalog
-from fclib.collections.known import plan_of
+from fclib.collections.set_index import plan_of
 from fclib.collections.verify import verify
 from fclib.scenes.shared import recorded
 

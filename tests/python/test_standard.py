@@ -18,7 +18,7 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import known, published, standing, trajectory
+from fclib.collections import published, ratings, set_index, trajectory
 from workshop.sets import candidates, choose, features, select
 from workshop.sets.__main__ import app as lists
 
@@ -53,7 +53,7 @@ def test_nearly_equal_problems_are_thinned() -> None:
 
 
 def test_features_are_what_their_names_say() -> None:
-    source = known.plan_of("tiny/FourBar").scene
+    source = set_index.plan_of("tiny/FourBar").scene
     problem = load("tiny/FourBar/0150")
     found = features.structure(features.Matrix(problem), source)
     assert (found["nc"], found["n"], found["p"]) == (problem.nc, problem.n, problem.p)
@@ -65,7 +65,9 @@ def test_features_are_what_their_names_say() -> None:
     # its joints join what contacts do not: islands of the contacts alone are no fewer
     assert (found["islands"] or 0) >= record["islands"]
     rolling = load("tiny/RollingDiscs/0040")
-    found = features.structure(features.Matrix(rolling), known.plan_of("tiny/RollingDiscs").scene)
+    found = features.structure(
+        features.Matrix(rolling), set_index.plan_of("tiny/RollingDiscs").scene
+    )
     assert (found["rolling"], found["planar"], found["spacedim"]) == (1, 1, 3)
     made = features.behaviour(features.Matrix(rolling))
     # does not take rolling friction
@@ -110,10 +112,10 @@ def test_choice_is_bounded_and_keeps_what_it_must() -> None:
 
 @there
 def test_standard_is_what_its_table_gives() -> None:
-    rule = json.loads((known.DATA / "standard.json").read_text())["rule"]
-    listed = known.choices("standard")
+    rule = json.loads((set_index.DATA / "standard.json").read_text())["rule"]
+    listed = set_index.choices("standard")
     assert len(listed) == rule["problems"]
-    rows = select.read_table(standing.folder() / "candidates.csv")
+    rows = select.read_table(ratings.folder() / "candidates.csv")
     kept = set(map(tuple, rule["kept"]))
     chosen = [rows[k] for k in select.choose(rows, select.Rule(rule["problems"]), kept)]
     assert [(row["family"], row["number"], row["digest"]) for row in chosen] == [
@@ -127,7 +129,7 @@ def test_standard_has_the_states_of_its_list() -> None:
     for folder in collections.sets()["standard"]:
         own = {
             c.number: c.digest
-            for c in known.choices("standard")
+            for c in set_index.choices("standard")
             if f"standard/{c.family}" == folder
         }
         stored = published.versions(folder)
@@ -143,20 +145,20 @@ def test_candidates_are_spread_and_named_by_their_scene(tmp_path: Path) -> None:
     assert candidates.spread(3, 9) == (0, 1, 2)
     (found,) = candidates.candidates(tmp_path, ["LocalProblems"], kept=5)
     assert len(list(found.problems())) == 5
-    plan = known.plan_of("planar/PlanarBlocks", chosen=(0, 1), problems=None, steps=20)
-    other = known.plan_of("planar/PlanarBlocks", seed=1, chosen=(0, 1), problems=None, steps=20)
+    plan = set_index.plan_of("planar/PlanarBlocks", chosen=(0, 1), problems=None, steps=20)
+    other = set_index.plan_of("planar/PlanarBlocks", seed=1, chosen=(0, 1), problems=None, steps=20)
     assert candidates.key(plan) == candidates.key(plan) != candidates.key(other)
 
 
 # ---- how problems stand
 
 
-def run(problem: str, solver: str, error: float | None, **more: Any) -> standing.Run:
-    digest = {f"{c.family}/{c.number:04d}": c.digest for c in known.choices("tiny")}[problem]
+def run(problem: str, solver: str, error: float | None, **more: Any) -> ratings.Run:
+    digest = {f"{c.family}/{c.number:04d}": c.digest for c in set_index.choices("tiny")}[problem]
     status = "converged" if error is not None and error <= 1e-8 else "time_limit"
     values: dict[str, Any] = {"version": "1", "limit": 1.0, "status": status, "cpu": 0.5}
     values |= {"error": error, "date": "2026-01-02", "solver": solver, "problem": problem} | more
-    return standing.Run(digest=digest[: standing.DIGITS], **values)
+    return ratings.Run(digest=digest[: ratings.DIGITS], **values)
 
 
 @pytest.fixture
@@ -169,11 +171,11 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     package.mkdir()
     (package / published.FOLDER).symlink_to(stored)
     monkeypatch.setattr(published, "IN_PLACE", package)
-    return package / standing.FOLDER
+    return package / ratings.FOLDER
 
 
-def ratings(name: str = "tiny") -> dict[str, str]:
-    return {row.id.partition("/")[2]: row.rating for row in standing.standings(name)[0]}
+def classes_by_problem(name: str = "tiny") -> dict[str, str]:
+    return {row.id.partition("/")[2]: row.rating for row in ratings.ratings_of(name)[0]}
 
 
 def test_classes_follow_from_runs(results: Path) -> None:
@@ -188,20 +190,20 @@ def test_classes_follow_from_runs(results: Path) -> None:
     rows += [run(kaplas, "d", None, status="unsuitable")]
     # of two versions the newer one
     rows += [run(kaplas, "c", 1e-9, date="2026-01-01", version="0")]
-    standing.write(rows)
-    found = ratings()
+    ratings.write(rows)
+    found = classes_by_problem()
     assert (found[wall], found[kaplas], found[discs]) == ("easy", "hard", "open")
     assert found[squeezed] == "easy"
     assert found["FourBar/0150"] == ""
-    (row,) = [row for row in standing.standings("tiny")[0] if row.rating == "open"]
+    (row,) = [row for row in ratings.ratings_of("tiny")[0] if row.rating == "open"]
     assert row.best is not None
     assert (row.best.solver, row.best.error, row.solved, row.voters) == ("a", 2e-8, 0, 3)
-    basis = standing.standings("tiny")[1]
+    basis = ratings.ratings_of("tiny")[1]
     assert basis is not None
     assert (basis.limits, basis.solvers) == ((1.0,), tuple("abcde"))
     # a longer run has no vote, and what it solves is no longer open
-    standing.write([*standing.runs(), run(discs, "auto", 9e-9, limit=60.0)])
-    assert ratings()[discs] == "hard"
+    ratings.write([*ratings.runs(), run(discs, "auto", 9e-9, limit=60.0)])
+    assert classes_by_problem()[discs] == "hard"
 
 
 def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
@@ -213,50 +215,50 @@ def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
     # of as many runs those that had less
     rows += [run(discs, "a", 1e-9, limit=limit) for limit in (10.0, 1.0)]
     # a solution that was taken in has no vote, where nothing was run
-    rows += [run("FourBar/0150", "me", 1e-9, limit=None, status=standing.TAKEN)]
-    standing.write(rows)
-    found = {row.id.partition("/")[2]: row for row in standing.standings("tiny")[0]}
+    rows += [run("FourBar/0150", "me", 1e-9, limit=None, status=ratings.TAKEN)]
+    ratings.write(rows)
+    found = {row.id.partition("/")[2]: row for row in ratings.ratings_of("tiny")[0]}
     assert {name: row.limit for name, row in found.items() if row.rating} == {
         wall: 1.0,
         kaplas: 10.0,
         discs: 1.0,
     }
     assert (found[kaplas].rating, found[kaplas].solved, found[kaplas].voters) == ("hard", 1, 3)
-    basis = standing.standings("tiny")[1]
+    basis = ratings.ratings_of("tiny")[1]
     assert basis is not None
     assert "within 1 or 10 s of CPU a run, by 4 solvers (a, b, c, d;" in str(basis)
 
 
 def test_equal_runs_make_equal_tables(results: Path) -> None:
     rows = [run("Wall/0003", name, 1e-9, limit=limit) for name in "abcdefgh" for limit in (1, 10)]
-    standing.write(rows)
-    assert [row.limit for row in standing.runs()] == [1, 10] * 8
+    ratings.write(rows)
+    assert [row.limit for row in ratings.runs()] == [1, 10] * 8
 
 
 def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) -> None:
     name = "tiny/RollingDiscs/0040"
     family = name.partition("/")[2]
-    standing.write([run(family, solver, 1e-3) for solver in "ab"])
+    ratings.write([run(family, solver, 1e-3) for solver in "ab"])
     problem = load(name)
     rough, fine = (fclib.solve(problem, tol=tol).solution for tol in (1e-5, 1e-10))
     path = tmp_path / "found.hdf5"
 
-    def take(problem: Any, solution: Any, *more: str) -> Any:
+    def offer(problem: Any, solution: Any, *more: str) -> Any:
         fclib.write(path, problem, solution)
         return invoke("collection", "take", path, "--by", "me", *more)
 
     # what the file says is not believed
-    done = take(problem, rough.replace(r=0 * rough.r))
+    done = offer(problem, rough.replace(r=0 * rough.r))
     assert done.exit_code == 1
     assert "0.001 is known by" in done.output
     # in its local form too
     local = problem.condense()
-    assert take(local, fclib.Solution(r=rough.r)).exit_code == 0
-    (row,) = [row for row in standing.standings("tiny")[0] if row.id == name]
+    assert offer(local, fclib.Solution(r=rough.r)).exit_code == 0
+    (row,) = [row for row in ratings.ratings_of("tiny")[0] if row.id == name]
     assert row.rating == "open" or row.best is not None
     assert row.best is not None
-    assert (row.best.solver, row.best.status) == ("me", standing.TAKEN)
-    own, solution, said = standing.known_solution(name)
+    assert (row.best.solver, row.best.status) == ("me", ratings.TAKEN)
+    own, solution, said = ratings.known_solution(name)
     assert fclib.digest(own) == row.digest
     assert fclib.merit(own, solution).error == pytest.approx(said["error"], rel=1e-3)
     # the best iterate of an open problem is no solution
@@ -267,25 +269,25 @@ def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) 
     assert (told["solver"], told["date"]) == ("me", said["date"])
     assert told["error"] == pytest.approx(said["error"], rel=1e-3)
     # not better
-    assert take(problem, rough).exit_code == 1
+    assert offer(problem, rough).exit_code == 1
     # another problem, unless it is named
     other = problem.replace(f=problem.f * (1 + 1e-12))
-    done = take(other, fine)
+    done = offer(other, fine)
     assert done.exit_code == 1
     assert "name it" in done.output
-    assert take(other, fine, "--problem", name).exit_code == 0
-    assert ratings()[family] == "hard"
-    done = take(problem, fine)
+    assert offer(other, fine, "--problem", name).exit_code == 0
+    assert classes_by_problem()[family] == "hard"
+    done = offer(problem, fine)
     assert done.exit_code == 1
     assert "is hard, and solutions are taken of open problems" in done.output
-    assert take(problem, None).exit_code == 1
+    assert offer(problem, None).exit_code == 1
 
 
 def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Path) -> None:
     assert "none of its" in invoke("collection", "status", "tiny").output
     store = tmp_path / "runs.sqlite"
     solvers = ("--solver", "nsgs", "--solver", "auto")
-    files = known.DATA / "tiny"
+    files = set_index.DATA / "tiny"
     done = invoke(
         *("bench", "--problems", files / "Wall/0003-global.hdf5"),
         *("--problems", files / "RollingDiscs/0040-global.hdf5", *solvers),
@@ -316,24 +318,24 @@ def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Pat
 @there
 def test_families_without_states_have_members_too() -> None:
     """Those that are assembled, as those whose states are stored."""
-    members = standing.members("existence")
+    members = ratings.members("existence")
     assert len(members) == 36 + 56 + 30
     family: Any = scenes.assemblies()["Jammed"]
     one = scenes.Assembled(family=family(), seed=0).problem(7)
     assert members["existence/Jammed/0007"] == fclib.digest(one)
-    assert len(standing.members("rr9118")) == len(known.choices("rr9118")) + 834
+    assert len(ratings.members("rr9118")) == len(set_index.choices("rr9118")) + 834
 
 
 @there
 def test_stored_solutions_have_the_errors_that_are_said() -> None:
     digests = {
-        digest[: standing.DIGITS]: name for name, digest in standing.members("standard").items()
+        digest[: ratings.DIGITS]: name for name, digest in ratings.members("standard").items()
     }
-    stored = sorted((standing.folder() / "solutions").glob("*.npz"))
+    stored = sorted((ratings.folder() / "solutions").glob("*.npz"))
     known_ones = [path for path in stored if path.stem in digests]
     assert known_ones == stored
     for path in stored[:: max(1, len(stored) // 4)]:
-        own, solution, said = standing.known_solution(digests[path.stem])
+        own, solution, said = ratings.known_solution(digests[path.stem])
         # on another machine the problem differs by rounding
         assert fclib.merit(own, solution).error == pytest.approx(said["error"], rel=0.1)
 
@@ -353,12 +355,12 @@ def test_no_problem_depends_on_auto(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(_solve, "solve", nonsense)
     plans = [collections.plan_of(f"tiny/{name}") for name in ("FourBar", "PlanarBlocks")]
     table = collections.build(plans, tmp_path, pictures=False)
-    assert {known.origin_of(row) for row in table.to_pylist()} == {"published"}
+    assert {set_index.origin_of(row) for row in table.to_pylist()} == {"published"}
     assert set(table["solver"].to_pylist()) == {"nsgs"}
 
 
 def test_part_of_a_trajectory_is_some_of_its_problems(tmp_path: Path) -> None:
-    path = published.path_of("rt444/KaplasTower", known.version_of("rt444/KaplasTower"))
+    path = published.path_of("rt444/KaplasTower", set_index.version_of("rt444/KaplasTower"))
     if path is None:
         pytest.skip("its states are not stored here")
     states = trajectory.read(path)
@@ -377,8 +379,8 @@ def test_part_of_a_trajectory_is_some_of_its_problems(tmp_path: Path) -> None:
 @there
 def test_problems_of_an_older_list_are_named_with_their_version(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    old = known.folders(["hard"], "6")
-    now = {f"hard/{choice.family}/{choice.number:04d}" for choice in known.choices("hard")}
+    old = set_index.folders(["hard"], "6")
+    now = {f"hard/{choice.family}/{choice.number:04d}" for choice in set_index.choices("hard")}
     names = [f"{own}/{number:04d}" for own in old for number in published.digests(own, "6")]
     gone = next(name for name in names if name.startswith("hard/PlanarBlocks") and name not in now)
     with pytest.raises(collections.VersionError, match=r"version 6 had: .* hard --version 6"):
@@ -388,41 +390,41 @@ def test_problems_of_an_older_list_are_named_with_their_version(tmp_path: Path) 
     collections.build([plan], tmp_path, pictures=False)
     rows = collections.read_catalog(tmp_path).to_pylist()
     assert [row["number"] for row in rows] == sorted(published.digests(folder, "6"))
-    assert {known.origin_of(row) for row in rows} == {"published"}
+    assert {set_index.origin_of(row) for row in rows} == {"published"}
     assert int(number) in [row["number"] for row in rows]
 
 
 @there
 def test_a_version_of_a_set_has_families_that_did_not_change() -> None:
     """The present one has all families, each by its newest states; an older one has its own."""
-    newest, older = known.folders(["standard"], known.version("standard")), {}
-    assert newest == known.folders(["standard"])
+    newest, older = set_index.folders(["standard"], set_index.version("standard")), {}
+    assert newest == set_index.folders(["standard"])
     for folder in newest:
-        plan = known.plan_of(folder, version=known.version("standard"))
-        assert plan.version == known.version_of(folder)
-        assert plan.numbers().tolist() == known.plan_of(folder).numbers().tolist()
+        plan = set_index.plan_of(folder, version=set_index.version("standard"))
+        assert plan.version == set_index.version_of(folder)
+        assert plan.numbers().tolist() == set_index.plan_of(folder).numbers().tolist()
         if "1" in published.versions(folder):
-            older[folder] = known.plan_of(folder, version="1")
-    assert known.folders(["standard"], "1") == sorted(older)
-    assert older["standard/Arch"].trajectory == known.plan_of("standard/Arch").trajectory
-    before, now = older["standard/Chute"], known.plan_of("standard/Chute")
+            older[folder] = set_index.plan_of(folder, version="1")
+    assert set_index.folders(["standard"], "1") == sorted(older)
+    assert older["standard/Arch"].trajectory == set_index.plan_of("standard/Arch").trajectory
+    before, now = older["standard/Chute"], set_index.plan_of("standard/Chute")
     assert before.trajectory != now.trajectory
     assert before.numbers().tolist() == now.numbers().tolist()
     with pytest.raises(collections.VersionError, match="version 99 is not stored here"):
-        known.plan_of("standard/Arch", version="99")
+        set_index.plan_of("standard/Arch", version="99")
 
 
 @there
 def test_hard_is_what_runs_class_so() -> None:
-    sets = json.loads((known.DATA / "hard.json").read_text())["rule"]["grown"]["sets"]
-    rated = {row.digest: row for name in ["standard", *sets] for row in standing.standings(name)[0]}
-    own = [rated[choice.digest] for choice in known.choices("hard")]
+    sets = json.loads((set_index.DATA / "hard.json").read_text())["rule"]["grown"]["sets"]
+    rated = {row.digest: row for name in ["standard", *sets] for row in ratings.ratings_of(name)[0]}
+    own = [rated[choice.digest] for choice in set_index.choices("hard")]
     assert {row.rating for row in own} <= {"hard", "open"}
     # version 8 was of standard alone, and is in what came later
-    before = [rated[choice.digest] for choice in known.listed("hard", "8")]
+    before = [rated[choice.digest] for choice in set_index.listed("hard", "8")]
     assert {row.id.partition("/")[0] for row in before} == {"standard"}
     assert len(before) == 57
-    later = [choice for choice in known.choices("hard") if choice.since == "9"]
+    later = [choice for choice in set_index.choices("hard") if choice.since == "9"]
     assert len(later) + len(before) == len(own)
     counts = Counter(rated[choice.digest].id.rpartition("/")[0] for choice in later)
     assert max(counts.values()) <= 5
@@ -434,14 +436,14 @@ def test_version_8_of_hard_is_whole() -> None:
     """Families that did not change since have their older states."""
     found = {
         (folder.partition("/")[2], number): digest
-        for folder in known.folders(["hard"], "8")
-        for plan in [known.plan_of(folder, version="8")]
+        for folder in set_index.folders(["hard"], "8")
+        for plan in [set_index.plan_of(folder, version="8")]
         for number, digest in (
-            published.digests(folder, plan.version) or standing.digests(folder)
+            published.digests(folder, plan.version) or ratings.digests(folder)
         ).items()
         if number in plan.numbers()
     }
-    assert found == {(c.family, c.number): c.digest for c in known.listed("hard", "8")}
+    assert found == {(c.family, c.number): c.digest for c in set_index.listed("hard", "8")}
 
 
 @there
@@ -449,10 +451,10 @@ def test_list_grows_by_what_runs_class_hard_or_open(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
-    members = standing.members("rt444")
+    members = ratings.members("rt444")
 
-    def ran(problem: str, solved: str) -> list[standing.Run]:
-        digest = members[f"rt444/{problem}"][: standing.DIGITS]
+    def ran(problem: str, solved: str) -> list[ratings.Run]:
+        digest = members[f"rt444/{problem}"][: ratings.DIGITS]
         one = run("Wall/0003", "a", 1e-9)
         return [
             replace(one, problem=problem, digest=digest, solver=name)
@@ -465,8 +467,8 @@ def test_list_grows_by_what_runs_class_hard_or_open(
 
     # of three hard ones the two that fewest solved, the first of equals; not the easy one
     rows = [*ran("Chain/0010", "a"), *ran("Chain/0020", "b"), *ran("Chain/0030", "")]
-    standing.write([*rows, *ran("Capsules/0150", "a"), *ran("BoxesStack/0100", "abc")])
-    tiny = {choice.family: choice for choice in known.choices("tiny")}
+    ratings.write([*rows, *ran("Capsules/0150", "a"), *ran("BoxesStack/0100", "abc")])
+    tiny = {choice.family: choice for choice in set_index.choices("tiny")}
     before, after, states = tmp_path / "old.json", tmp_path / "data/hard.json", tmp_path / "own"
     after.parent.mkdir()
     choose.write_list(before, [tiny["Capsules"], tiny["Wall"]], {"share": 0.5})
@@ -485,14 +487,14 @@ def test_list_grows_by_what_runs_class_hard_or_open(
     assert listed("hard", "--keep", after, *more, "--out", again).exit_code == 0
     assert again.read_text() == after.read_text()
 
-    monkeypatch.setattr(known, "DATA", after.parent)
+    monkeypatch.setattr(set_index, "DATA", after.parent)
     monkeypatch.setattr(published, "IN_PLACE", states)
-    known.choices.cache_clear()
+    set_index.choices.cache_clear()
     try:
-        assert known.folders(["hard"], "8") == ["hard/Capsules", "hard/Wall"]
-        assert known.plan_of("hard/Wall", version="8").numbers().tolist() == [3]
+        assert set_index.folders(["hard"], "8") == ["hard/Capsules", "hard/Wall"]
+        assert set_index.plan_of("hard/Wall", version="8").numbers().tolist() == [3]
         with pytest.raises(collections.VersionError, match="version 8 is not stored here"):
-            known.plan_of("hard/Chain", version="8")
+            set_index.plan_of("hard/Chain", version="8")
         out = tmp_path / "built"
         done = invoke(
             *("collection", "build", "hard/Chain", "hard/Capsules_rt444", "hard/Wall"),
@@ -503,7 +505,7 @@ def test_list_grows_by_what_runs_class_hard_or_open(
         found = built["hard/Capsules_rt444/0150"]
         assert found["digest"] == members["rt444/Capsules/0150"]
         assert found["license"] is not None
-        assert {known.origin_of(row) for row in built.values()} == {"published"}
+        assert {set_index.origin_of(row) for row in built.values()} == {"published"}
         assert all(verdict.ok for verdict in collections.verify(out))
         problem = load("hard/Capsules_rt444/0150", folder=out)
         assert fclib.digest(problem) == found["digest"]
@@ -515,4 +517,4 @@ def test_list_grows_by_what_runs_class_hard_or_open(
         assert listed(*args, "--version", "1").exit_code == 2
         assert listed(*args, before).exit_code == 2
     finally:
-        known.choices.cache_clear()
+        set_index.choices.cache_clear()

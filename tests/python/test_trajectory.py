@@ -24,7 +24,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections, simulate
-from fclib.collections import known, published, trajectory
+from fclib.collections import published, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation
 from fclib.collections.record import record
 from workshop.sets import collection_table
@@ -251,7 +251,7 @@ def test_another_solver_changes_no_problem(installed: Path, tmp_path: Path, solv
     made = digests(tmp_path / "other")
     assert len(made) == NUMBERS
     assert made == digests(tmp_path / "auto")
-    assert {known.origin_of(row) for row in table.to_pylist()} == {"published"}
+    assert {set_index.origin_of(row) for row in table.to_pylist()} == {"published"}
 
 
 def test_another_solver_of_the_simulation_is_another_version(
@@ -263,7 +263,7 @@ def test_another_solver_of_the_simulation_is_another_version(
     own = collections.from_folder(plan(), tmp_path)
     assert (own.version, own.trajectory) == ("own", other)
     table = collections.build([own], tmp_path / "built", pictures=False)
-    assert {known.origin_of(row) for row in table.to_pylist()} == {"yours"}
+    assert {set_index.origin_of(row) for row in table.to_pylist()} == {"yours"}
 
 
 def test_frozen_problems_outlive_their_family(
@@ -287,7 +287,7 @@ def test_newest_version_is_meant_and_older_ones_stay(store: Path, tmp_path: Path
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(published, "IN_PLACE", folder)
         assert published.versions(FOLDER) == ["7", "10"]
-        assert known.version_of(FOLDER) == plan().version == "10"
+        assert set_index.version_of(FOLDER) == plan().version == "10"
         assert plan().scene.parameters["boxes"] == 2
         older = plan(version="7")
         assert (older.version, older.scene.parameters["boxes"]) == ("7", 3)
@@ -295,12 +295,12 @@ def test_newest_version_is_meant_and_older_ones_stay(store: Path, tmp_path: Path
             plan(version="8")
         collections.build([older], tmp_path / "built", pictures=False)
         rows = collections.read_catalog(tmp_path / "built").to_pylist()
-        assert {known.origin_of(row) for row in rows} == {"published"}
+        assert {set_index.origin_of(row) for row in rows} == {"published"}
         assert {row["version"] for row in rows} == {"7"}
         # what a name means now is not what lies there
         with pytest.raises(collections.VersionError, match=r"holds version 7.* present one is 10"):
             fclib.load(f"{FOLDER}/0003", folder=tmp_path / "built")
-    assert known.version_of("planar/DiscFlow") == collections.version("planar")
+    assert set_index.version_of("planar/DiscFlow") == collections.version("planar")
 
 
 def test_another_seed_is_yours(installed: Path, tmp_path: Path) -> None:
@@ -310,7 +310,7 @@ def test_another_seed_is_yours(installed: Path, tmp_path: Path) -> None:
     collections.build([quick], tmp_path, pictures=False)
     assert (tmp_path / FOLDER / trajectory.OWN).is_file()
     rows = collections.read_catalog(tmp_path).to_pylist()
-    assert {known.origin_of(row) for row in rows} == {"yours"}
+    assert {set_index.origin_of(row) for row in rows} == {"yours"}
 
 
 @pytest.mark.parametrize(
@@ -373,7 +373,7 @@ def test_what_cancels_in_the_sums_is_measured(
 
 
 def test_differences_of_two_problems() -> None:
-    problem = read(known.DATA / "tiny/KaplasTower/0030-global.hdf5")
+    problem = read(set_index.DATA / "tiny/KaplasTower/0030-global.hdf5")
     H = problem.H.copy()
     place = np.abs(H.data).argmax()
     largest = abs(H.data[place])
@@ -420,9 +420,9 @@ STORED = sorted(
 STORED.sort(key=lambda name: name.partition("/")[2])  # those of a family follow each other
 # what the sets have now, of which states are published
 PRESENT = {
-    folder: f"{folder}-{known.version_of(folder)}{trajectory.SUFFIX}"
+    folder: f"{folder}-{set_index.version_of(folder)}{trajectory.SUFFIX}"
     for name in sorted({name.partition("/")[0] for name in STORED})
-    for folder in known.sets()[name]
+    for folder in set_index.sets()[name]
 }
 there = pytest.mark.skipif(not STORED, reason="collection/ is not here: a source distribution")
 CORE = ("rt444", "tiny", "hard", "standard")
@@ -486,7 +486,7 @@ MODELS: list[Any] = []  # of the family that was tested last
 
 def share_model(states: Any) -> None:
     """Several sets have one scene: its model, which takes seconds to make, is made once."""
-    if states.scene.solids is not None:
+    if states.scene.solids is not None or states.handed is not None:
         return
     if MODELS and MODELS[0].scene.name != states.scene.name:
         MODELS.clear()
@@ -529,7 +529,7 @@ def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any
     folder, _, version = name.removesuffix(trajectory.SUFFIX).rpartition("-")
     # a list may call a family otherwise
     own = f"{states.origin['collection']}/{states.scene.name}"
-    assert own == f"{folder.partition('/')[0]}/{known.kind_of(folder)}"
+    assert own == f"{folder.partition('/')[0]}/{set_index.kind_of(folder)}"
     assert states.origin["version"] == version
     assert published.path_of(folder, version) == path
     assert int(version) <= int(collections.version(folder.split("/")[0]))
@@ -544,7 +544,7 @@ def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any
     bound = deepest(name, states)
     sizes = []
     for place in range(len(states)) if row else sorted(compared | looked_at):
-        if place in compared:
+        if place in compared or states.handed is not None:
             part = states.problem(place)
             check_digest(folder, states, place, part.problem)
         else:
@@ -553,7 +553,11 @@ def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any
             )
         if place in compared | looked_at:
             # a joint's limit has no bodies that touch
-            gap = part.contacts.gap[part.contacts.pair[:, 0] >= 0]
+            gap = (
+                part.problem.contacts.gap
+                if states.handed is not None
+                else (part.contacts.gap[part.contacts.pair[:, 0] >= 0])
+            )
             assert gap.min(initial=0.0) > -bound
         problem = part.problem
         sizes.append({"n": problem.n, "nc": problem.nc, "density": problem.m / problem.n})
@@ -577,7 +581,10 @@ def deepest(name: str, states: Any) -> float:
     folder = name.rpartition("-")[0]
     if states.scene.interactions:
         return float("inf")  # the laws of a deck keep penetrations
-    size = states.model.smallest_size
+    if states.handed is not None:
+        size = min(min(one.size) for one in states.handed.solids if one.mass)
+    else:
+        size = states.model.smallest_size
     if size is None:
         size = 0.5 * min(min(block.size) for block in states.scene.solids.blocks)
     bound = DEEPEST
@@ -597,7 +604,7 @@ def test_the_published_sizes_are_those_of_sets_with_states() -> None:
 @pytest.mark.parametrize("name", RANGES)
 def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
     folder = f"rt444/{name}"
-    path = published.path_of(folder, known.version_of(folder))
+    path = published.path_of(folder, set_index.version_of(folder))
     assert path is not None
     states = trajectory.read(path)
     dofs, contacts, thickness = RANGES[name]
@@ -606,7 +613,8 @@ def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
         part = states.problem(place)
         assert dofs[0] <= part.problem.n <= dofs[1]
         assert contacts[0] <= part.problem.nc <= contacts[1]
-        assert part.contacts.gap.min() > -limit
+        gap = (part.problem if states.handed is not None else part).contacts.gap
+        assert gap.min() > -limit
 
 
 @there
@@ -619,7 +627,7 @@ def test_the_bound_is_that_of_all_families_of_published_sets() -> None:
 @there
 def test_a_column_at_rest_has_all_its_contacts() -> None:
     """Contacts neither come nor go at the end: four for each box."""
-    path = published.path_of("rt444/BoxesStack", known.version_of("rt444/BoxesStack"))
+    path = published.path_of("rt444/BoxesStack", set_index.version_of("rt444/BoxesStack"))
     assert path is not None
     states = trajectory.read(path)
     boxes = states.scene.parameters["boxes"]

@@ -14,7 +14,7 @@ from fclib import collections
 from fclib.bench import Store
 from fclib.cli._output import fail, out, usage_error
 from fclib.cli._progress import many_bars
-from fclib.collections import known
+from fclib.collections import set_index
 from workshop.sets import choose, select
 from workshop.sets.candidates import candidates
 
@@ -94,7 +94,7 @@ def grow(
     """Write a list that has the hard and open problems of further sets too."""
     try:
         rule = json.loads(kept.read_text(encoding="utf-8"))["rule"]
-        chosen, sources = choose.grown(known.Choice.read(kept), sets, version, per_family)
+        chosen, sources = choose.grown(set_index.Choice.read(kept), sets, version, per_family)
         rule["grown"] = {"sets": sets, "per_family": per_family}
         choose.write_list(target, chosen, rule)
         if states is not None:
@@ -131,7 +131,7 @@ def choose_standard(
     is, even if its family has changed.
     """
     rule = select.Rule(problems=problems, clusters=clusters)
-    held = known.Choice.read(kept) if kept is not None else ()
+    held = set_index.Choice.read(kept) if kept is not None else ()
     try:
         rows = select.read_table(table) if table.is_file() else []
         sources = {}

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from fclib import scenes
-from fclib.collections import known, trajectory
+from fclib.collections import set_index, trajectory
 from fclib.collections.plan import Plan, Simulation, families
 from fclib.collections.record import record
 
@@ -67,7 +67,7 @@ def candidates(
         if names and name not in names:
             continue
         collection, version = COSTLY.get(name, (family.collection, None))
-        plan = known.plan_of(f"{collection}/{name}", version=version)
+        plan = set_index.plan_of(f"{collection}/{name}", version=version)
         if isinstance(plan.scene, scenes.Assembled) or plan.trajectory is not None:
             yield drawn(plan, kept)
             continue
@@ -97,5 +97,5 @@ def spread(total: int, kept: int) -> tuple[int, ...]:
 def key(plan: Plan) -> str:
     """The hash of a scene as it is, of the steps kept and of the settings of the simulation."""
     assert isinstance(plan.scene, scenes.Scene)
-    said = [trajectory.record(plan.scene), plan.simulation.record(), plan.chosen]
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:12]
+    values = [trajectory.record(plan.scene), plan.simulation.record(), plan.chosen]
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:12]

@@ -20,10 +20,10 @@ import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
 from fclib._origin import origin_of
-from fclib.collections import catalog, known, standing, trajectory
-from fclib.collections.known import Choice
+from fclib.collections import catalog, ratings, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
+from fclib.collections.set_index import Choice
 from workshop.sets.candidates import Candidates
 
 Progress = Callable[[str, int, int], None]
@@ -175,14 +175,14 @@ def grown(
 
     Raises:
         KeyError: there is no such set.
-        OSError, StandingError, TrajectoryError: states or results cannot be read.
+        OSError, RatingError, TrajectoryError: states or results cannot be read.
     """
     chosen = [replace(c, since=c.since or str(int(version) - 1)) for c in kept]
     sources: dict[str, Candidates] = {}
     for name in names:
-        rows, _ = standing.standings(name)
+        rows, _ = ratings.ratings_of(name)
         members = {row.digest for row in rows}
-        wanted: dict[str, list[standing.Standing]] = defaultdict(list)
+        wanted: dict[str, list[ratings.RatedProblem]] = defaultdict(list)
         there = {choice.digest for choice in chosen}
         for row in rows:
             # take the first of equal problems
@@ -197,7 +197,7 @@ def grown(
             room = per_family - sum(choice.family == label for choice in chosen)
             if room <= 0:
                 continue
-            plan = known.plan_of(folder)
+            plan = set_index.plan_of(folder)
             states = None if plan.trajectory is None else trajectory.read(plan.trajectory)
             sources[label] = Candidates(plan, tuple(plan.numbers().tolist()), states)
             for row in own[:room]:
@@ -370,15 +370,19 @@ def local(
                 measure(problem, f"{row['id']}, contact {c}")
                 for c, problem in contacts_of(folder / row["local_file"])
             ]
-            hardest += take(own, 1)
+            hardest += hardest_distinct(own, 1)
             tell(name, done, len(places))
-        found += take(hardest, per_family)
+        found += hardest_distinct(hardest, per_family)
     spun = [measure(spinning(seed), f"a spinning body, seed {seed}") for seed in range(spins)]
     plain, rolling = spun[::2], spun[1::2]
-    return found + take(plain, asymmetric - asymmetric // 2) + take(rolling, asymmetric // 2)
+    return (
+        found
+        + hardest_distinct(plain, asymmetric - asymmetric // 2)
+        + hardest_distinct(rolling, asymmetric // 2)
+    )
 
 
-def take(contacts: Sequence[Contact], count: int) -> list[Contact]:
+def hardest_distinct(contacts: Sequence[Contact], count: int) -> list[Contact]:
     """The hardest contacts that some local solver solves; of equals only the first."""
     solvable = [contact for contact in contacts if min(contact.sweeps.values()) <= SWEEPS]
     ranked = sorted(solvable, key=lambda contact: contact.difficulty, reverse=True)

@@ -13,7 +13,7 @@ import argparse
 from collections import Counter
 
 from fclib._verdicts import CLASSES
-from fclib.collections import standing
+from fclib.collections import ratings
 from workshop.tables import _results
 
 SETS = ("machines", "robots", "impacts", "existence", "dynamics", "simulators", "rr9118")
@@ -25,10 +25,10 @@ def main() -> None:
     parser.add_argument("sets", nargs="*", default=SETS)
     _results.add_option(parser)
     arguments = parser.parse_args()
-    families: dict[str, list[standing.Standing]] = {}
+    families: dict[str, list[ratings.RatedProblem]] = {}
     solvers: set[str] = set()
     for name in arguments.sets:
-        rows, basis = standing.standings(name)
+        rows, basis = ratings.ratings_of(name)
         if basis:
             solvers.update(basis.solvers)
         for row in rows:

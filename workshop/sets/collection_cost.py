@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes
-from fclib.collections import known, published
+from fclib.collections import published, set_index
 from workshop.tables import _results
 
 SETS = ("rt444", "rr9118", "impacts", "existence", "dynamics", "robots", "machines", "simulators")
@@ -51,7 +51,7 @@ def built(folder: str, out: Path, options: list[str], limit: float) -> dict[str,
     process.returncode = code = os.waitstatus_to_exitcode(status)
     return {
         "family": folder,
-        "problems": known.problems_of(folder),
+        "problems": set_index.problems_of(folder),
         "CPU [s]": f"{usage.ru_utime + usage.ru_stime:.1f}",
         "memory [GB]": f"{usage.ru_maxrss * 1024 / 1e9:.2f}",
         "ends": {0: "built", -9: f"stopped after {limit:g} s"}.get(code, f"exit status {code}"),
@@ -72,7 +72,7 @@ def main() -> None:
     if not arguments.with_references:
         options.append("--no-references")
     rows = []
-    for folder in filter(has_states, known.folders(arguments.names)):
+    for folder in filter(has_states, set_index.folders(arguments.names)):
         if (arguments.out / folder).exists():
             continue
         rows.append(built(folder, arguments.out, options, arguments.limit))

@@ -43,10 +43,9 @@ from fclib import collections
 from fclib.analysis._brief import spectrum_of_W
 from fclib.analysis._data import Data, asymmetry
 from fclib.analysis._spectrum import spectrum
-from fclib.collections import known as versions
 from fclib.collections import published as stored
+from fclib.collections import set_index as versions
 from fclib.collections import trajectory
-from fclib.simulate import problem_at
 from workshop.tables import _results
 
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
@@ -74,7 +73,7 @@ def span(values: Iterable[Any]) -> str:
 
 def figures(problem: Any) -> tuple[float, float]:
     """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN where it does not."""
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     found = spectrum_of_W(data, asymmetry(data.W))
     if found is None and data.reduced is not None:
         found = spectrum(data.reduced.W, rounding=data.reduced.rounding)
@@ -178,8 +177,7 @@ def growth(name: str, limit: int) -> Iterator[dict[str, str]]:
     states = trajectory.read(path)
     least = 0.0
     for k in range(len(states)):
-        position, velocity = states.position[k], states.velocity[k]
-        problem = problem_at(states.model, states.scheme, position, velocity).problem
+        problem = states.problem(k).problem
         last = k == len(states) - 1
         if not (problem.n >= least or last) or problem.m > limit:
             continue

@@ -131,7 +131,7 @@ def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
     if m > DENSE:
         return None, None
     try:
-        reduced = Data.of(problem).reduced
+        reduced = Data.of_problem(problem).reduced
     except _core.Error:
         return None, None
     if reduced is None:

@@ -37,9 +37,9 @@ import scipy.sparse as sp
 
 import fclib
 from fclib import _digest, scenes
-from fclib.collections import known, published, trajectory
-from fclib.collections.known import Choice
+from fclib.collections import published, set_index, trajectory
 from fclib.collections.plan import Simulation, evenly
+from fclib.collections.set_index import Choice
 from fclib.simulate import Contacts, Model, model_of, problem_at, scheme_of, simulate
 from workshop.sets import collection_table
 
@@ -413,7 +413,7 @@ def main() -> None:
         return
     for name in arguments.families or REGIMES:
         own = make(name, REGIMES[name], arguments.out)
-        before = known.Choice.read(target) if target.is_file() else ()
+        before = set_index.Choice.read(target) if target.is_file() else ()
         listed = [choice for choice in before if choice.family != name] + own
         listed.sort(key=lambda choice: (choice.family, choice.number))
         rows = [{k: v for k, v in asdict(choice).items() if v != ""} for choice in listed]

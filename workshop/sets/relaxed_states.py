@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _digest
-from fclib.collections import known, published, standing, trajectory
+from fclib.collections import published, ratings, set_index, trajectory
 from fclib.collections.plan import DEEPEST
 from fclib.simulate import problem_at, relaxed
 from workshop.sets import choose, features, select
@@ -37,7 +37,7 @@ SETS = ("standard", "tiny")
 
 def newest(folder: str) -> Path:
     """The file of the newest states of SET/FAMILY."""
-    path = published.path_of(folder, known.version_of(folder))
+    path = published.path_of(folder, set_index.version_of(folder))
     assert path is not None
     return path
 
@@ -79,10 +79,10 @@ def mended(states: trajectory.Trajectory, version: str) -> trajectory.Trajectory
 
 def write_list(name: str, changed: dict[str, trajectory.Trajectory]) -> None:
     """The list of a set, with the new digests; what it keeps is then all that it has."""
-    path = known.DATA / f"{name}.json"
+    path = set_index.DATA / f"{name}.json"
     rule = json.loads(path.read_text(encoding="utf-8"))["rule"]
     choices = []
-    for choice in known.choices(name):
+    for choice in set_index.choices(name):
         if choice.family in changed:
             states = changed[choice.family]
             choice = replace(choice, digest=states.digest[states.index(choice.number)])
@@ -94,7 +94,7 @@ def write_list(name: str, changed: dict[str, trajectory.Trajectory]) -> None:
 
 def write_candidates(changed: dict[str, trajectory.Trajectory]) -> None:
     """The table of candidates, with new rows for the problems that changed."""
-    path = standing.folder() / "candidates.csv"
+    path = ratings.folder() / "candidates.csv"
     rows = select.read_table(path)
     for place, row in enumerate(rows):
         states = changed.get(row["family"])
@@ -111,9 +111,9 @@ def write_candidates(changed: dict[str, trajectory.Trajectory]) -> None:
 def make(name: str) -> None:
     """Mend the states of a set, its list and the table of candidates."""
     changed = {}
-    version = known.version(name)
+    version = set_index.version(name)
     for folder in published.folders(name):
-        if folder not in known.sets()[name]:
+        if folder not in set_index.sets()[name]:
             continue
         new = mended(trajectory.read(newest(folder)), version)
         if new is not None:

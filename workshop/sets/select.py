@@ -25,8 +25,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _digest, scenes
-from fclib.collections import catalog, known, trajectory
-from fclib.collections.known import Choice
+from fclib.collections import catalog, set_index, trajectory
+from fclib.collections.set_index import Choice
 from workshop.sets import features
 from workshop.sets.candidates import Candidates
 
@@ -169,7 +169,7 @@ def choose(
     contacts = np.array([float(row["nc"]) for row in everything])
     held = np.array([(str(row["family"]), int(row["number"])) in kept for row in everything])
     # rows that are decided already
-    settled = held | np.isin(family, [name for name, _ in kept])
+    decided = held | np.isin(family, [name for name, _ in kept])
     # for each bound: the rows that count, the least and the largest number
     kinds = [(family == name, rule.least, rule.most) for name in np.unique(family)]
     edges = [least for least, *_ in SIZES] + [np.inf]
@@ -206,7 +206,7 @@ def choose(
         integrality=np.ones(columns),
         bounds=Bounds(
             np.concatenate([held, np.zeros(columns - count)]),
-            np.concatenate([held | ~settled, np.ones(groups), np.full(len(kinds), np.inf)]),
+            np.concatenate([held | ~decided, np.ones(groups), np.full(len(kinds), np.inf)]),
         ),
     )
     if solved.x is None:
@@ -257,7 +257,7 @@ def sources_of(folder: Path, names: Collection[str]) -> dict[str, Candidates]:
             continue
         own = f"{row['collection']}/{name}"
         assembled = name in scenes.assemblies()
-        plan = known.plan_of(own, version=None if assembled else row["version"])
+        plan = set_index.plan_of(own, version=None if assembled else row["version"])
         states = None if plan.trajectory is None else trajectory.read(plan.trajectory)
         numbers = plan.numbers().tolist()
         found[name] = Candidates(plan, tuple(numbers), states)

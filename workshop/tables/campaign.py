@@ -103,7 +103,8 @@ def main() -> None:
         for option in ("time_limit", "wall_limit", "sample", "repeats"):
             if (value := getattr(arguments, option)) is not None:
                 command += [f"--{option.replace('_', '-')}", value]
-        subprocess.run(command, check=True)
+        if code := subprocess.run(command).returncode:
+            raise SystemExit(code)
     for table in TABLES[arguments.table](store, arguments):
         name = f"{arguments.results or f'campaign-{arguments.name}'}{table.ending}"
         title = table.title.format(name=arguments.name)
@@ -133,7 +134,7 @@ def solved(store: Path, _: argparse.Namespace) -> list[Table]:
     table = []
     for family in sorted({one.family for one in whole.instances}):
         places = [k for k, one in enumerate(whole.instances) if one.family == family]
-        part = whole.of(places)
+        part = whole.on_instances(places)
         sizes = [one.nc for one in part.instances]
         ends = dict.fromkeys((min(sizes), max(sizes)))
         cells: dict[str, Any] = {"family": family, "contacts": " to ".join(map(str, ends))}
@@ -165,7 +166,7 @@ def compared(store: Path, _: argparse.Namespace) -> list[Table]:
     with bench.Store(store, create=False) as opened:
         first = opened.status()[0]
         runs = opened.table(more=("key",))
-    spent = runner.spent(runs, set(runs["key"].values))
+    spent = runner.budget_used(runs, set(runs["key"].values))
     note = (
         f"{profiles.caption(whole, rows, WEIGH)}. {first.done} of the campaign's {first.planned}"
         f" runs, in {spent / 60:.0f} min of runs."
@@ -439,12 +440,13 @@ def along(store: Path, _: argparse.Namespace) -> list[Table]:
         }
         for row in profiles.along(store, rows)
     ]
-    load = max(row["load"] for row in rows)
-    limits = sorted({row["time_limit"] for row in rows})
-    note = f"{limits[-1]:g} s of CPU a solve, consecutive problems from the middle of the stored"
-    return [
-        Table(table, "Warm against cold along sequences", f"{note} states; load up to {load:.1f}")
-    ]
+    load, limit = max(row["load"] for row in rows), max(row["time_limit"] for row in rows)
+    tols = ", ".join(f"{tol:g}" for tol in sorted({row["tol"] for row in rows}))
+    note = (
+        f"tolerance {tols}, {limit:g} s of CPU a solve, consecutive problems from the middle of"
+        f" the stored states; load up to {load:.1f}"
+    )
+    return [Table(table, "Warm against cold along sequences", note)]
 
 
 TABLES = {

@@ -208,15 +208,15 @@ def main() -> None:
     if not rows:
         return
 
-    def of(name: str) -> list[float]:
+    def times_of(name: str) -> list[float]:
         return [row[name] for row in rows.values()]
 
-    medians = {name: statistics.median(of(name)) for name in COLUMNS}
+    medians = {name: statistics.median(times_of(name)) for name in COLUMNS}
     print(line("median", medians))
-    total = sum(of("bytes_ours")), sum(of("bytes_3_1"))
+    total = sum(times_of("bytes_ours")), sum(times_of("bytes_3_1"))
     print(f"total of {len(rows)} files: {total[0]:.0f} of {total[1]:.0f} bytes, ", end="")
     print(f"{total[0] / total[1]:.1%}")
-    share = {name: sum(of(name)) / total[1] for name in COLUMNS[-4:]}
+    share = {name: sum(times_of(name)) / total[1] for name in COLUMNS[-4:]}
     rest = total[0] / total[1] - share["entries"] - share["indices"]
     print(f"of it headers and texts {rest:.1%}", end="")
     for name in ("entries", "indices"):
@@ -234,8 +234,8 @@ def main() -> None:
                 },
             ],
             title="Our files beside those of libfclib 3.1",
-            note=f"{len(rows)} files of {min(of('bytes_3_1')) / 1e3:.0f} kB to "
-            f"{max(of('bytes_3_1')) / 1e6:.1f} MB.",
+            note=f"{len(rows)} files of {min(times_of('bytes_3_1')) / 1e3:.0f} kB to "
+            f"{max(times_of('bytes_3_1')) / 1e6:.1f} MB.",
         )
     if options.csv:
         with options.csv.open("w", newline="") as stream:

@@ -20,22 +20,22 @@ import fclib
 from fclib import scenes
 from fclib._verdicts import UNSUITABLE
 from fclib.bench import comparison, profiles
-from fclib.collections import standing
+from fclib.collections import ratings
 from workshop.tables import _results
 
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
 
 
-def votes() -> dict[tuple[str, str], standing.Run]:
+def votes() -> dict[tuple[str, str], ratings.Run]:
     """The last run of each problem and solver that takes it, at the limit of its family.
 
     Of the solvers that were tried on the whole set: other campaigns share some of its problems.
     """
-    rows, basis = standing.standings(standing.FIRST)
+    rows, basis = ratings.ratings_of(ratings.FIRST)
     assert basis is not None, "no runs are stored"
-    own = {row.digest[: standing.DIGITS]: row for row in rows if row.limit is not None}
+    own = {row.digest[: ratings.DIGITS]: row for row in rows if row.limit is not None}
     found = {}
-    for run in sorted(standing.runs(), key=standing.when):
+    for run in sorted(ratings.runs(), key=ratings.when):
         row = own.get(run.digest)
         if row is not None and run.limit == row.limit:
             found[row.id, run.solver] = run
@@ -44,7 +44,7 @@ def votes() -> dict[tuple[str, str], standing.Run]:
     return {key: run for key, run in found.items() if tried[key[1]] == most}
 
 
-def rows_of(runs: dict[tuple[str, str], standing.Run]) -> list[dict[str, Any]]:
+def rows_of(runs: dict[tuple[str, str], ratings.Run]) -> list[dict[str, Any]]:
     """The runs as a store has them."""
     return [
         {
@@ -53,7 +53,7 @@ def rows_of(runs: dict[tuple[str, str], standing.Run]) -> list[dict[str, Any]]:
             "problem": name,
             "family": name.split("/")[1],
             "nc": None,
-            "tol": standing.TOLERANCE,
+            "tol": ratings.TOLERANCE,
             "time_limit": run.limit,
             "status": run.status,
             "cpu_s": run.cpu,
@@ -109,7 +109,7 @@ def main() -> None:
     table: list[dict[str, Any]] = []
     for kind, places in kinds.items():
         # of a kind that only some take, these
-        part = comparison.compared(every.of(places))
+        part = comparison.compared(every.on_instances(places))
         rows = {row["solver"]: row for row in profiles.summary(part, weigh=WEIGH)[1:]}
         ranked = [name for name in rows if name != "auto"]
         row = {"kind": kind, "problems": len(part.instances), "solvers": len(rows)}

@@ -291,7 +291,7 @@ def analyze(
         ImportError: Clarabel is needed for the verdict, but not installed.
     """
     problem.validate()
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     matrices = data.matrices
     nan = float("nan")
     spectra: dict[str, Spectrum] = {

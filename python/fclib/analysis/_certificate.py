@@ -110,30 +110,30 @@ def _system(problem: _solve.Problem, used: set[int]) -> _System:
     cone: dict[int, list[tuple[int, Fraction]]] = defaultdict(list)
     zero: dict[int, list[tuple[int, Fraction]]] = defaultdict(list)
 
-    def take(to: dict[int, list[tuple[int, Fraction]]], row: int, k: int, value: float) -> None:
+    def add_term(to: dict[int, list[tuple[int, Fraction]]], row: int, k: int, value: float) -> None:
         if k in used and value:
             to[k].append((row, Fraction(value)))
 
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         for row, col, value in _entries(problem.H):
             if col % d == 0:
-                take(zero, row, col // d, value)
+                add_term(zero, row, col // d, value)
         if problem.G is not None:
             for row, col, value in _entries(problem.G):
-                take(zero, row, nc + col, value)
+                add_term(zero, row, nc + col, value)
         constants = [*problem.w[::d], *(problem.b if problem.b is not None else [])]
     else:
         for row, col, value in _entries(problem.W):
             if row % d == 0:
-                take(cone, col, row // d, -value)
+                add_term(cone, col, row // d, -value)
         if problem.V is not None:
             for row, col, value in _entries(problem.V):
-                take(cone, row, nc + col, -value)
+                add_term(cone, row, nc + col, -value)
                 if row % d == 0:
-                    take(zero, col, row // d, value)
+                    add_term(zero, col, row // d, value)
         if problem.R is not None:
             for row, col, value in _entries(problem.R):
-                take(zero, col, nc + row, value)
+                add_term(zero, col, nc + row, value)
         constants = [*problem.q[::d], *(problem.s if problem.s is not None else [])]
     return _System(nc, p, d, cone, zero, [Fraction(float(one)) for one in constants])
 

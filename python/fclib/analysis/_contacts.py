@@ -60,7 +60,7 @@ def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[n
         fclib.ProblemError: problem or solution is not valid.
     """
     each = _core.contact_merits(problem, solution)
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     d, nc = data.d, problem.nc
     r, u = solution.r, each["u"]
     rows, speeds = r.reshape(nc, d), u.reshape(nc, d)
@@ -128,7 +128,7 @@ def energy(problem: _solve.Problem, solution: _core.Solution) -> Energy:
         fclib.ProblemError: problem or solution is not valid.
     """
     _core.merit(problem, solution)  # this validates both
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     r, u = completed(data, solution)
     q = data.local.q
     work = float(r @ (u + q)) / 2

@@ -76,7 +76,7 @@ class Data:
     local: Local  # the problem itself, or condensed
 
     @classmethod
-    def of(cls, problem: _solve.Problem) -> Data:
+    def of_problem(cls, problem: _solve.Problem) -> Data:
         """Raises fclib.UnsuitableError if M is singular."""
         if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
             return cls(problem, problem.condense())

@@ -533,7 +533,7 @@ class _Search:
         self.problem, self.end = whole.problem, end
         self.system = _System(whole)
         self.counts = tuple(len(own) for own in self.system.states)
-        self.alive = np.ones(self.counts, dtype=bool)
+        self.unrefuted = np.ones(self.counts, dtype=bool)
         self.robust = True
         self.speed = _speed(self.problem)
         self.leaves: list[tuple[tuple[int, ...], dict[int, Fraction], bool, bool]] = []
@@ -544,8 +544,8 @@ class _Search:
 
     def run(self) -> Enumeration:
         complete = True
-        if self.alive.size > FEW_STATES and self.system.whole.plain:
-            _refute(self.system, self.alive, ROBUST * self.speed, self.end)
+        if self.unrefuted.size > FEW_STATES and self.system.whole.plain:
+            _refute(self.system, self.unrefuted, ROBUST * self.speed, self.end)
         table = Table(self.system.A, self.system.b, self.system.denominator)
         try:
             proof = table.feasible(self._allowed((None,) * self.problem.nc))
@@ -560,7 +560,7 @@ class _Search:
     def _visit(self, table: Table, states: tuple[int | None, ...]) -> None:
         if time.monotonic() > self.end:
             raise LateError
-        left = self.alive[tuple(slice(None) if s is None else s for s in states)]
+        left = self.unrefuted[tuple(slice(None) if s is None else s for s in states)]
         if not left.any():
             return
         undecided = [a for a, s in enumerate(states) if s is None]
@@ -576,7 +576,7 @@ class _Search:
         a = undecided[place]
         for s in np.flatnonzero(possible[place]):
             child = (*states[:a], int(s), *states[a + 1 :])
-            if not self.alive[tuple(slice(None) if t is None else t for t in child)].any():
+            if not self.unrefuted[tuple(slice(None) if t is None else t for t in child)].any():
                 continue
             own = table.copy()
             allowed = self._allowed(child)
@@ -607,7 +607,7 @@ class _Search:
             if strict is not None and any(state.strict == strict for state in own):
                 held = [h and state.strict == strict for h, state in zip(held, own, strict=True)]
             refuted = np.logical_and.outer(refuted, np.array(held))
-        self.alive &= ~refuted
+        self.unrefuted &= ~refuted
 
     def _weigh(self, proof: Any) -> None:
         """Whether the proof still holds if each component of q and s changes a little."""
@@ -629,7 +629,7 @@ class _Search:
                 self._kill(zero[:-1] >= 0, strict)
                 return
             points.append(table.point())
-        self.alive[states] = False
+        self.unrefuted[states] = False
         middle: dict[int, Fraction] = {}
         for point in points:
             for k, value in point.items():
@@ -687,7 +687,7 @@ class _Search:
             )
         missing = "" if complete else LATE
         robust = complete and self.robust
-        size = (self.problem.nc, self.alive.size)
+        size = (self.problem.nc, self.unrefuted.size)
         return Enumeration(tuple(found), missing, robust, *size, self.speed)
 
     def _near(self, u: Numbers, r: Numbers, states: Any) -> bool:
@@ -721,7 +721,7 @@ def _speed(problem: _solve.Problem) -> float:
     return norm([*problem.q, *(() if problem.s is None else problem.s)])
 
 
-def _refute(system: _System, alive: Any, change: float, end: float) -> None:
+def _refute(system: _System, unrefuted: Any, change: float, end: float) -> None:
     """Refutes states in doubles, despite all rounding and any small change of q and s.
 
     In a state, the system B x = -q of the nonzero unknowns has an approximate inverse Y. If e = ||I
@@ -744,7 +744,7 @@ def _refute(system: _System, alive: Any, change: float, end: float) -> None:
     G_size, q_size = abs(G), abs(q)
     unit = 2 * EPS * (2 * max(G.shape) + 4)  # rounding of sums of products, with rounded entries
 
-    numbers = np.argwhere(alive)
+    numbers = np.argwhere(unrefuted)
     used, held, sign = (
         np.concatenate([table[numbers[:, a]] for a, table in enumerate(tables)], axis=1)
         for tables in names
@@ -780,4 +780,4 @@ def _refute(system: _System, alive: Any, change: float, end: float) -> None:
                 beyond = (x + error < 0).any(axis=1)
                 beyond |= (sign[batch] * u + 1.001 * wide_u < 0).any(axis=1)
                 refuted = beyond & (e < 0.5) & np.isfinite(error).all(axis=1)
-            alive[tuple(numbers[batch[refuted]].T)] = False
+            unrefuted[tuple(numbers[batch[refuted]].T)] = False

@@ -126,7 +126,7 @@ class Reference:
         if self.solution is None or self.merit is None:
             raise _core.ProblemError("there is no solution to speak of")
         merits = {f"merit_{name}": float(getattr(self.merit, name)) for name in _solve.ERRORS}
-        said = [
+        sentences = [
             f"{run.solver} ({'+'.join(run.families)}) from {run.start}: error {run.error:.1e}, "
             f"velocity differs by {run.difference:.1e}"
             for run in self.runs
@@ -138,7 +138,9 @@ class Reference:
             "solver": self.runs[0].solver,
             **merits,
             "merit_1": _core.merit_1(self.problem, self.solution),
-            "algorithms": "; ".join(said[:1] + said[-1:] if self.confirmed else said[:1]),
+            "algorithms": "; ".join(
+                sentences[:1] + sentences[-1:] if self.confirmed else sentences[:1]
+            ),
             "certified": "yes" if self.certified else f"no: {self.reason}",
             "reaction": self.reaction,
             "versions": versions(),
@@ -175,7 +177,7 @@ def reference(
         ImportError: reactions are not unique, and Clarabel is not installed.
     """
     problem.validate()
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     first, run = _first(data, target, time_limit)
     if not first.error <= CONFIRMED * target:
         reason = f"no algorithm came nearer than {first.error:.1e}"

@@ -7,9 +7,9 @@
 `run` makes one run by hand; `Campaign` and `run_campaign` make thousands. A supervisor is a process
 that has a worker forked, hands it a job, watches its time and memory, and judges what it returns.
 
-campaign.py     makes jobs of a TOML file. Needs problems.py, made.py, modules.py
+campaign.py     makes jobs of a TOML file. Needs problems.py, generated.py, modules.py
 problems.py     the files that a campaign names, and what the campaign knows of each problem
-made.py         problems that a campaign has made: steps of a scene, random ones
+generated.py    problems that a campaign has made: steps of a scene, random ones
 modules.py      files of Python with solvers of the user's own
 fingerprint.py  what tells two versions of a solver apart
 job.py          what travels: a job there, a record back, and the statuses of a record
@@ -32,14 +32,14 @@ table.py        runs in columns
 comparison.py   what an instance is, which of them are compared, and their costs
 profiles.py     profiles, means and ratios of the runs of a store. It knows no problem
 plots.py        profiles as pictures
-single.py       one run by hand, in this process
+one_run.py      one run by hand, in this process
 """
 
 from fclib._solve import MeritKind
 from fclib.bench.campaign import Campaign, CampaignError
 from fclib.bench.job import STATUSES, Job, Limits, ProblemFacts, Record, SolverChoice
+from fclib.bench.one_run import COLUMNS, Run, run
 from fclib.bench.runner import Progress, run_campaign
-from fclib.bench.single import COLUMNS, Run, run
 from fclib.bench.store import Store, StoreError
 
 __all__ = [

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from fclib import _solve
-from fclib.bench import machine, made
+from fclib.bench import generated, machine
 
 VERSION: Final = 1  # another set of solves gets another number
 SECONDS: Final = 60.0  # of CPU, for all solves together
@@ -65,7 +65,7 @@ def calibrate(
         show: called with the name of each solve.
     """
     date, load = time.strftime("%Y-%m-%d"), os.getloadavg()[0]
-    problems = {size: made.plant(size, 3, 1) for size in SIZES}
+    problems = {size: generated.plant(size, 3, 1) for size in SIZES}
     share = seconds / (len(SIZES) * len(SOLVERS))
     found, spreads = {}, []
     for solver in SOLVERS:

@@ -21,9 +21,9 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
-from fclib._meant import meant
 from fclib._solve import MeritKind
-from fclib.bench import made, problems
+from fclib._suggest import suggestion
+from fclib.bench import generated, problems
 from fclib.bench.fingerprint import version_of
 from fclib.bench.job import Along, Job, Limits, ProblemFacts, SolverChoice
 from fclib.bench.modules import load_modules
@@ -326,18 +326,18 @@ class Campaign:
         paths = problems.files_of(group.files, self.base, group.form, tell) if group.files else []
         if group.set and group.sequence is not None:
             steps = group.sequence
-            paths += made.stored(group.set, group.form, steps.start, steps.count, steps.stride)
+            paths += generated.stored(group.set, group.form, steps.start, steps.count, steps.stride)
         elif group.set:
             paths += problems.of_set(group.set, group.form, tell)
         if group.simulate is not None:
-            paths += made.simulated(
+            paths += generated.simulated(
                 family=group.simulate["family"],
                 parameters=group.simulate.get("parameters", {}),
                 steps=group.simulate["steps"],
                 seed=group.simulate.get("seed", 0),
             )
         if group.planted is not None:
-            paths += made.planted(
+            paths += generated.planted(
                 count=group.planted["count"],
                 contacts=group.planted["contacts"],
                 spacedim=group.planted.get("spacedim", 3),
@@ -405,7 +405,7 @@ def _only(entries: object, known: set[str], where: str) -> None:
     for name in entries:
         if name not in known:
             raise CampaignError(
-                f"{where}{name}: is not known here; {meant(name, known)}"
+                f"{where}{name}: is not known here; {suggestion(name, known)}"
                 f"there is: {', '.join(sorted(known))}"
             )
 

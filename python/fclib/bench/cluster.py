@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
-from fclib.bench import made
+from fclib.bench import generated
 from fclib.bench.job import Job, ProblemFacts, Record, Runner
 from fclib.bench.pool import SupervisorClient
 
@@ -76,7 +76,7 @@ def _moved(problem: ProblemFacts, data: bytes) -> ProblemFacts:
 
 def _kept(name: str, data: bytes) -> Path:
     """The file in the cache folder that holds these bytes."""
-    folder = made.cache_folder() / "sent"
+    folder = generated.cache_folder() / "sent"
     path = folder / f"{name}.hdf5"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)

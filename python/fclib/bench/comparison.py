@@ -74,17 +74,17 @@ def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
         return rows
     known = list(rows)
     names = dict.fromkeys(name for row in known for name in row)
-    return Table.of([{name: row.get(name) for name in names} for row in known])
+    return Table.of_rows([{name: row.get(name) for name in names} for row in known])
 
 
 def words_in(runs: Table, name: str) -> Words:
     """A column of texts; None in each row if there is no such column."""
     if name not in runs:
-        return Words.of([None] * len(runs))
+        return Words.of_texts([None] * len(runs))
     own = runs[name]
     if isinstance(own, Words):
         return own
-    return Words.of(None if value != value else str(value) for value in own.tolist())
+    return Words.of_texts(None if value != value else str(value) for value in own.tolist())
 
 
 def numbers_in(runs: Table, name: str, missing: float = math.nan) -> Array:
@@ -308,7 +308,7 @@ class Costs:
         """The costs over the number of contacts; instances without any are left out."""
         contacts = np.array([instance.nc for instance in self.instances])
         there = contacts > 0
-        part = self.of(np.flatnonzero(there))
+        part = self.on_instances(np.flatnonzero(there))
         return replace(part, values=part.values / contacts[there, None])
 
     def shared(self, solvers: Sequence[str] | None = None) -> Costs:
@@ -317,12 +317,12 @@ class Costs:
         kept = np.flatnonzero(part.there.all(axis=1))
         lost = part.there.any(axis=1) & ~part.there.all(axis=1)
         left = Counter(part.instances[k].tol for k in np.flatnonzero(lost))
-        return replace(part.of(kept), left=dict(left))
+        return replace(part.on_instances(kept), left=dict(left))
 
     def own(self, solvers: Sequence[str] | None = None) -> Costs:
         """The costs of some solvers, each on the instances that it has run and takes."""
         part = self.chosen(self.solvers if solvers is None else solvers)
-        return part.of(np.flatnonzero(part.there.any(axis=1)))
+        return part.on_instances(np.flatnonzero(part.there.any(axis=1)))
 
     def widest(self) -> tuple[str, ...]:
         """The solvers whose common set has at least the share `COMMON` of their instances.
@@ -352,39 +352,39 @@ class Costs:
         """The costs of some solvers, on all instances."""
         columns = [self.solvers.index(name) for name in solvers]
 
-        def of(own: Any) -> Any:
+        def part_of(own: Any) -> Any:
             return None if own is None else own[:, columns]
 
         return replace(
             self,
             solvers=tuple(solvers),
             values=self.values[:, columns],
-            spread=of(self.spread),
-            unsuitable=of(self.unsuitable),
-            copies=of(self.copies),
-            forms=of(self.forms),
+            spread=part_of(self.spread),
+            unsuitable=part_of(self.unsuitable),
+            copies=part_of(self.copies),
+            forms=part_of(self.forms),
         )
 
-    def of(self, chosen: Iterable[int]) -> Costs:
+    def on_instances(self, chosen: Iterable[int]) -> Costs:
         """The costs on some of the instances."""
         numbers = list(chosen)
 
-        def of(own: Any) -> Any:
+        def part_of(own: Any) -> Any:
             return None if own is None else own[numbers]
 
         return replace(
             self,
             instances=tuple(self.instances[k] for k in numbers),
             values=self.values[numbers],
-            spread=of(self.spread),
-            unsuitable=of(self.unsuitable),
-            copies=of(self.copies),
-            forms=of(self.forms),
+            spread=part_of(self.spread),
+            unsuitable=part_of(self.unsuitable),
+            copies=part_of(self.copies),
+            forms=part_of(self.forms),
         )
 
     def at(self, tol: float) -> Costs:
         """The costs at one tolerance."""
-        part = self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
+        part = self.on_instances(k for k, one in enumerate(self.instances) if one.tol == tol)
         left = {t: n for t, n in self.left.items() if t == tol}
         return replace(part, left=left, other={t: n for t, n in self.other.items() if t == tol})
 
@@ -467,9 +467,12 @@ def gather(
         refused = words_in(runs, "status").is_in((UNSUITABLE,))
     value = numbers_in(runs, metric)
     good = solved_in(runs) & ~np.isnan(value)
-    spent = np.where(good, np.maximum(value, METRICS[metric][1]), np.inf)
+    costs_of_runs = np.where(good, np.maximum(value, METRICS[metric][1]), np.inf)
     found = _cells(
-        cell[~refused], form[~refused], numbers_in(runs, "copy", 0.0)[~refused], spent[~refused]
+        cell[~refused],
+        form[~refused],
+        numbers_in(runs, "copy", 0.0)[~refused],
+        costs_of_runs[~refused],
     )
     values, spread, copies = (np.full(shape, np.nan) for _ in range(3))
     forms = np.zeros(shape, np.int64)
@@ -515,16 +518,16 @@ def described(runs: Table, place: Integers, keys: Sequence[Key]) -> tuple[list[I
     names = ("problem", "family", "nc", "time_limit", "wall_limit")
     some = Table({name: runs[name] for name in names if name in runs}).where(first)
     instances = []
-    for key, forms, said in zip(keys, own, some, strict=True):
+    for key, forms, row in zip(keys, own, some, strict=True):
         instances.append(
             Instance(
                 hash=key[0],
-                problem=said["problem"],
-                family=said["family"],
-                nc=said["nc"],
+                problem=row["problem"],
+                family=row["family"],
+                nc=row["nc"],
                 tol=key[1],
-                limit=said["time_limit"],
-                wall_limit=said.get("wall_limit") or math.inf,
+                limit=row["time_limit"],
+                wall_limit=row.get("wall_limit") or math.inf,
                 sequence=key[2],
                 step=key[3],
                 forms=tuple(forms),
@@ -544,18 +547,18 @@ class _Cells:
     form: Integers
 
 
-def _cells(cell: Integers, form: Integers, copy: Array, spent: Array) -> _Cells:
+def _cells(cell: Integers, form: Integers, copy: Array, costs_of_runs: Array) -> _Cells:
     """Repeats give the cost of a copy, copies the cost of a form; one of the forms counts."""
     if not len(cell):
         none = np.zeros(0)
         return _Cells(cell, none, none, none, cell)
     # sort the repeats of a run side by side, the quickest first
-    order = np.lexsort((spent, copy, form, cell))
-    cell, form, copy, spent = cell[order], form[order], copy[order], spent[order]
+    order = np.lexsort((costs_of_runs, copy, form, cell))
+    cell, form, copy, costs_of_runs = cell[order], form[order], copy[order], costs_of_runs[order]
     first = _starts(cell, form, copy)
     count = np.diff(np.append(first, len(cell)))
-    solved = np.add.reduceat(np.isfinite(spent).astype(np.int64), first)
-    quickest, slowest = spent[first], spent[first + np.maximum(solved, 1) - 1]
+    solved = np.add.reduceat(np.isfinite(costs_of_runs).astype(np.int64), first)
+    quickest, slowest = costs_of_runs[first], costs_of_runs[first + np.maximum(solved, 1) - 1]
     cost = np.where(2 * solved >= count, quickest, np.inf)
     with np.errstate(invalid="ignore"):
         spread = np.where((solved > 1) & np.isfinite(quickest), slowest / quickest - 1, np.nan)

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from fclib.bench.made import cache_folder
+from fclib.bench.generated import cache_folder
 
 CPUINFO = Path("/proc/cpuinfo")
 SCALING = Path("/sys/devices/system/cpu/cpu0/cpufreq")

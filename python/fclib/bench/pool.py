@@ -47,12 +47,12 @@ MARK_OF_OURS = "mark"  # file that marks such a folder as ours
 FILES = "files"
 START = """
 import json, site, sys
-path, user, link, alive, folder, mark, cores = json.loads(sys.argv[1])
+path, user, link, lifeline, folder, mark, cores = json.loads(sys.argv[1])
 sys.path[:] = path
 if user:
     site.addsitedir(user)
 from fclib.bench.supervisor import main
-main(link, alive, folder, mark, cores)
+main(link, lifeline, folder, mark, cores)
 """
 
 
@@ -124,7 +124,7 @@ class SupervisorClient:
         self.stopped: float | None = None  # time since which it is stopped
         self.mark = ""
         self.folder, self.lock = "", -1
-        self.alive = -1  # the end of a pipe, open as long as this process lives
+        self.lifeline = -1  # the end of a pipe, open as long as this process lives
 
     def give(self, job: Job) -> None:
         """Send a job."""
@@ -137,7 +137,7 @@ class SupervisorClient:
         # without an answer by then it hangs. Up to three phases wait for the worker to read or send
         most = 4 * READY_LIMIT + WARM_LIMIT + 2 * job.limits.wall
         self.patience, self.stopped = time.monotonic() + most, None
-        with contextlib.suppress(OSError):  # it has ended; `take` finds out
+        with contextlib.suppress(OSError):  # it has ended; `collect` finds out
             self.link.send(job.order())
 
     def _start(self) -> None:
@@ -146,24 +146,24 @@ class SupervisorClient:
         Path(self.folder).mkdir()
         self.mark = uuid.uuid4().hex
         ours, theirs = socket.socketpair()
-        alive, self.alive = os.pipe()
+        lifeline, self.lifeline = os.pipe()
         user = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
         cores = self.threads if self.pin else 0
         mark = f"{MARK}={self.mark}"
-        words = [search_path(), user, theirs.fileno(), alive, self.folder, mark, cores]
+        words = [search_path(), user, theirs.fileno(), lifeline, self.folder, mark, cores]
         with theirs:
             self.process = subprocess.Popen(
                 [sys.executable, "-I", "-c", START, json.dumps(words)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno(), alive],
+                pass_fds=[theirs.fileno(), lifeline],
                 env=os.environ | dict.fromkeys(THREADS, str(self.threads)) | {MARK: self.mark},
                 start_new_session=True,  # Ctrl-C must not reach it
             )
-        os.close(alive)
+        os.close(lifeline)
         self.link = Connection(ours.detach())
 
-    def take(self) -> tuple[Job, Record]:
+    def collect(self) -> tuple[Job, Record]:
         """The record of the job; `lost` if the supervisor is gone."""
         assert self.job is not None
         assert self.link is not None
@@ -196,7 +196,7 @@ class SupervisorClient:
         assert self.link is not None
         while not wait([self.link], LOOK):
             self.hangs()
-        return self.take()[1]
+        return self.collect()[1]
 
     def kill(self) -> None:
         """End the supervisor and all processes that it started."""
@@ -222,7 +222,7 @@ class SupervisorClient:
         if self.folder:
             shutil.rmtree(Path(self.folder).parent, ignore_errors=True)
             os.close(self.lock)
-            os.close(self.alive)
+            os.close(self.lifeline)
             self.folder = ""
         return code
 
@@ -259,7 +259,7 @@ def run(jobs: Iterator[Job], processes: int) -> Iterator[tuple[Job, Record]]:
             for link in ready:
                 assert isinstance(link, Connection)
                 supervisor = busy.pop(link)
-                taken = supervisor.take()
+                taken = supervisor.collect()
                 idle.append(supervisor)
                 if taken[1].ran:
                     feed()  # so that the worker need not wait until the record is used

@@ -127,12 +127,12 @@ def of_set(
 
 def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
     """Tells the progress of a family's build: at its beginning, and every `PATIENCE` seconds."""
-    said = -PATIENCE
+    last_told = -PATIENCE
 
     def show(name: str, done: int, total: int) -> None:
-        nonlocal said
-        if time.monotonic() - said >= PATIENCE:
-            said = time.monotonic()
+        nonlocal last_told
+        if time.monotonic() - last_told >= PATIENCE:
+            last_told = time.monotonic()
             tell(f"family {which}: {name}, {done} of {total} problems")
 
     return show

@@ -192,9 +192,9 @@ def read(store: Store, more: Sequence[str] = ()) -> Table:
         return runs
     _, first = runs.numbers("hash")
     pairs = pair_forms(iter(runs.where(first)))
-    said = words_in(runs, "same_as")
+    declared = words_in(runs, "same_as")
     own = words_in(runs, "hash").map(lambda digest: pairs.get(str(digest)))
-    if not pairs or any(said.values):
+    if not pairs or any(declared.values):
         return runs  # the campaign already said which forms belong together
     return runs.with_columns(same_as=own)
 
@@ -210,14 +210,14 @@ def _name_machines(runs: Table) -> Table:
         else kind["node"]
         for kind in kinds
     ]
-    own = Words.of(names)
+    own = Words.of_texts(names)
     return runs.with_columns(node=Words(own.values, own.codes[number]))
 
 
 def _name_solvers(runs: Table) -> Table:
     """Relabel solvers of the same label that ran with different settings."""
 
-    def of(row: Mapping[str, Any]) -> dict[str, str]:
+    def facts_of(row: Mapping[str, Any]) -> dict[str, str]:
         options = object_in(row["options"])
         return {
             "version": row["version"] or "?",
@@ -230,14 +230,14 @@ def _name_solvers(runs: Table) -> Table:
     kinds = list(runs.where(first))
     ways: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for row in kinds:
-        for name, value in of(row).items():
+        for name, value in facts_of(row).items():
             ways[row["solver"]][name].add(value)
     names = []
     for row in kinds:
         own = ways[row["solver"]]
-        differing = [value for name, value in of(row).items() if len(own[name]) > 1]
+        differing = [value for name, value in facts_of(row).items() if len(own[name]) > 1]
         names.append(f"{row['solver']} ({', '.join(differing)})" if differing else row["solver"])
-    found = Words.of(names)
+    found = Words.of_texts(names)
     return runs.with_columns(solver=Words(found.values, found.codes[number]))
 
 
@@ -642,7 +642,7 @@ def families(
         groups[instance.family, instance.tol, instance.limit].append(k)
     rows = []
     for (family, tol, limit), numbers in sorted(groups.items()):
-        part = costs.of(numbers)
+        part = costs.on_instances(numbers)
         best = part.best[np.isfinite(part.best)]
         quickest = np.where(np.isnan(part.values), np.inf, part.values).argmin(axis=1)
         wins = Counter(part.solvers[k] for k in quickest[np.isfinite(part.best)])
@@ -749,7 +749,7 @@ def along(
     found = []
     with Store(store, create=False) as opened:
         for (sequence, tol, solver), pairs in sorted(chains.items()):
-            spent = np.array([[_spent(row) for row in pair] for pair in pairs]).sum(axis=0)
+            cpu = np.array([[_cpu_of(row) for row in pair] for pair in pairs]).sum(axis=0)
             counts = np.array([[row["iterations"] or 0 for row in pair] for pair in pairs])
             solved = np.array([[is_solved(row["status"]) for row in pair] for pair in pairs])
             apart = [
@@ -764,7 +764,7 @@ def along(
                     "sequence": sequence,
                     "tol": -tol,
                     "solver": solver,
-                    "cold CPU / warm CPU": float(spent[1] / max(spent[0], 1e-9)),
+                    "cold CPU / warm CPU": float(cpu[1] / max(cpu[0], 1e-9)),
                     "iterations warm": int(counts[:, 0].sum()),
                     "iterations cold": int(counts[:, 1].sum()),
                     "solved warm": int(solved[:, 0].sum()),
@@ -777,7 +777,7 @@ def along(
     return found
 
 
-def _spent(row: Mapping[str, Any]) -> float:
+def _cpu_of(row: Mapping[str, Any]) -> float:
     """CPU time in seconds: the solver's own, or the whole run's if the former is not known."""
     return float(row["cpu_s"] if row["cpu_s"] is not None else row["total_cpu_s"] or 0.0)
 
@@ -805,14 +805,14 @@ def curves(
     runs = table_of(rows)
     runs = runs.where(~words_in(runs, "status").is_in((UNSUITABLE,)))
     names = words_in(runs, "solver").tolist()
-    numbers, spent = (
+    numbers, times_of_runs = (
         numbers_in(runs, "run").astype(int).tolist(),
         numbers_in(runs, "cpu_s").tolist(),
     )
     found: dict[str, list[tuple[Array, Array]]] = defaultdict(list)
     some = False
     with Store(store, create=False) as opened:
-        for solver, run, cpu_s in zip(names, numbers, spent, strict=True):
+        for solver, run, cpu_s in zip(names, numbers, times_of_runs, strict=True):
             history = opened.history(run)
             times, errors = least_errors(history, None if math.isnan(cpu_s) else cpu_s)
             some = some or bool(times.size)
@@ -906,7 +906,7 @@ def caption(
         known = sorted(set(values))
         return f"{known[0]:g}" if len(known) == 1 else f"{known[0]:g} to {known[-1]:g}"
 
-    def said(name: str) -> str:
+    def first_word(name: str) -> str:
         return str(next((word for word in in_order(words_in(runs, name)) if word), "?"))
 
     runs = table_of(rows)
@@ -941,7 +941,7 @@ def caption(
         words.append(f"{costs.left_out} instances left out, which not all have run or take")
     if costs.of_other_forms:
         words.append(f"{costs.of_other_forms} runs of the other form of a problem left out")
-    words += [f"{said('cpu')} ({said('node')})"]
+    words += [f"{first_word('cpu')} ({first_word('node')})"]
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
     return "; ".join(words)

@@ -77,7 +77,7 @@ class Queue(Iterator[Job]):
         self.retries = retries
         # called with each job that is skipped because the step before it was not done
         self.left = left
-        self.open = {job.key for job in jobs}  # jobs that are not settled yet
+        self.open = {job.key for job in jobs}  # jobs that are not finished yet
         self.held: dict[str, list[Job]] = defaultdict(list)  # jobs by the run that they wait for
         # jobs not done, with the cause; None: the budget is spent
         self.gone: dict[str, Record | None] = {}
@@ -120,7 +120,7 @@ class Queue(Iterator[Job]):
         self.again.append((time.monotonic() + PAUSES[min(count, len(PAUSES)) - 1], job))
         return True
 
-    def settle(self, job: Job) -> None:
+    def finish(self, job: Job) -> None:
         """A job is done: the jobs that wait for it come next."""
         self.open.discard(job.key)
         self.jobs.extendleft(self.held.pop(job.key, ()))
@@ -151,7 +151,7 @@ def cost(record: Record) -> float:
     return (record.wall_s if waited else record.total_cpu_s) or 0.0
 
 
-def spent(runs: Table, keys: Collection[str]) -> float:
+def budget_used(runs: Table, keys: Collection[str]) -> float:
     """Seconds of the budget that the runs of some keys have taken."""
     waited = runs["status"] == "wall_limit"
     costs = np.where(waited, runs["wall_s"], runs["total_cpu_s"])
@@ -220,7 +220,7 @@ def run_campaign(
         there = set(runs["key"].values)
         left = [job for key, job in plan.items() if key not in there]
         progress = Progress(planned=len(plan), skipped=len(plan) - len(left))
-        progress.spent = spent(runs, plan)
+        progress.spent = budget_used(runs, plan)
         node = machine.facts()["node"]
         number = opened.begin(campaign.name, campaign.text, len(plan), progress.skipped, node)
         show(progress)
@@ -234,7 +234,7 @@ def run_campaign(
             """The job; None if another campaign has done it, or the budget is too small."""
             if opened.has(job.key):
                 progress.skipped += 1
-                queue.settle(job)
+                queue.finish(job)
                 return None
             if campaign.budget is not None and progress.spent >= campaign.budget:
                 progress.left_over += 1
@@ -277,7 +277,7 @@ def run_campaign(
                             progress.statuses[record.status] += 1
                         else:
                             progress.skipped += 1
-                        queue.settle(job)
+                        queue.finish(job)
                     show(progress)
                     if time.monotonic() - beat > BEAT:
                         opened.alive(number)

@@ -574,10 +574,10 @@ class Store:
 
     def mended(self) -> Table:
         """All runs with their keys, after the damaged rows are removed."""
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always", DamageWarning)
             runs = self.table(more=("key",))
-        if said:
+        if warned:
             self.mend()
             runs = self.table(more=("key",))
         return runs
@@ -834,7 +834,7 @@ class Store:
             name: numbers_of(name, np.concatenate(found.pop(name))) for name in numbers
         }
         for name in texts:
-            columns[name] = Words.of(_text(value) for value in words.pop(name))[
+            columns[name] = Words.of_texts(_text(value) for value in words.pop(name))[
                 np.concatenate(codes.pop(name))
             ]
         there = np.ones(len(columns["run"]), dtype=bool)
@@ -846,7 +846,7 @@ class Store:
                     continue
                 given = [row[other] for row in known[column]] + [None]  # the last: NULL
                 if name in TEXTS:
-                    columns[name] = Words.of(given)[places]
+                    columns[name] = Words.of_texts(given)[places]
                 else:
                     columns[name] = numbers_of(name, given)[places]
         table = Table({name: columns[name] for name in wanted})

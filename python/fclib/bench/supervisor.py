@@ -83,7 +83,7 @@ TOLD = (
     *("kind", "spacedim", "warm", "nonce"),
 )
 # statuses that a worker may report; it is not believed if it blames something outside
-SAID = frozenset(STATUSES) - {*SURROUNDINGS, "lied"} | {"no_space", "killed"}
+REPORTABLE = frozenset(STATUSES) - {*SURROUNDINGS, "lied"} | {"no_space", "killed"}
 
 
 def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
@@ -201,11 +201,11 @@ class Worker:
 class Supervisor:
     """A worker, and the problems that judge its answers."""
 
-    def __init__(self, campaign: Connection, alive: int, folder: str, mark: str) -> None:
+    def __init__(self, campaign: Connection, lifeline: int, folder: str, mark: str) -> None:
         self.campaign = campaign
         self.folder = folder  # for the temporary files of the workers
         own_end = socket.socket(fileno=os.dup(campaign.fileno()))
-        self.template = Template(own_end, alive, mark, serve)
+        self.template = Template(own_end, lifeline, mark, serve)
         own_end.close()
         self.ours = {self.template.pid}  # children that are not part of a run
         self.problems = Problems()
@@ -331,16 +331,16 @@ class Supervisor:
                 watch.check()
                 pause = min(1.5 * pause, PAUSES[1])
 
-    def said(self, order: dict[str, Any], watch: Watch) -> dict[str, Any]:
+    def reply(self, order: dict[str, Any], watch: Watch) -> dict[str, Any]:
         """The next message of the worker about this order.
 
         Raises:
             WorkerEnded: there will be none, or it is about another order.
         """
         try:
-            said = json.loads(self.receive(order, watch))
-            if said.pop("nonce") == order["nonce"]:
-                return dict(said)
+            reply = json.loads(self.receive(order, watch))
+            if reply.pop("nonce") == order["nonce"]:
+                return dict(reply)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             pass
         raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
@@ -452,17 +452,17 @@ class Supervisor:
         order["nonce"] = os.urandom(8).hex()
         limits = order["limits"]
         self.tell(order, json.dumps({name: order[name] for name in TOLD}).encode())
-        said = self.said(order, Watch(meter, cpu=LOAD_LIMIT))
-        if said.get("word") == "warming":
+        reply = self.reply(order, Watch(meter, cpu=LOAD_LIMIT))
+        if reply.get("word") == "warming":
             wall, cpu = (min(WARM_LIMIT, limits[name]) for name in ("wall", "time"))
             try:
-                said = self.said(order, Watch(meter, wall, cpu, limits["memory"]))
+                reply = self.reply(order, Watch(meter, wall, cpu, limits["memory"]))
             except WorkerEnded:
                 # the solver may do better on the real problem
                 self.stop()
                 return self.ask(order | {"warm": False}, problem, guess, record)
-        if said.get("word") != "ready":
-            return self.arrays(order, take(said, record))
+        if reply.get("word") != "ready":
+            return self.arrays(order, accept_answer(reply, record))
         if not worker.belongings and order["solver"] in built_in():
             worker.belongings = processes.belongings(meter.pid)
         took, early = self.hand(order, problem, guess)
@@ -470,7 +470,7 @@ class Supervisor:
         watch = Watch(meter, limits["wall"], limits["time"] - early, limits["memory"])
         try:
             self.tell(order, GO)
-            word = self.said(order, watch)
+            word = self.reply(order, watch)
             watch.stop()
             if word != {"word": "done"}:
                 raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
@@ -481,15 +481,15 @@ class Supervisor:
         self.limit(meter, math.inf)
         after = Watch(meter, cpu=limits["time"])
         self.tell(order, GO)
-        said = self.said(order, after)
-        worker.unchanged = said.get("unchanged") is True
-        names = take(said, record)
+        reply = self.reply(order, after)
+        worker.unchanged = reply.get("unchanged") is True
+        names = accept_answer(reply, record)
         vectors = self.arrays(order, names)
         after.stop()
         # a worker that says "done" too early gains nothing
         outside = early + max(0.0, after.cpu - SLACK - TAKING * took)
         record.total_cpu_s = watch.cpu + outside
-        check_times(order["solver"], record, said.get("reported") is True, watch, outside)
+        check_times(order["solver"], record, reply.get("reported") is True, watch, outside)
         return vectors
 
     def hand(self, order: dict[str, Any], problem: Any, guess: Any) -> tuple[float, float]:
@@ -506,7 +506,7 @@ class Supervisor:
         watch = Watch(meter, cpu=order["limits"]["time"])
         self.tell(order, message)
         del message
-        word = self.said(order, watch)
+        word = self.reply(order, watch)
         watch.stop()
         if word != {"word": "taken"}:
             raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
@@ -580,7 +580,7 @@ def numbers(message: bytes) -> Any:
     return np.frombuffer(message)
 
 
-def take(said: dict[str, Any], record: Record) -> list[str]:
+def accept_answer(reply: dict[str, Any], record: Record) -> list[str]:
     """Check a worker's answer and put it into the record. Return the names of arrays that follow.
 
     Raises:
@@ -588,13 +588,13 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
     """
     number = (int, float)
     try:
-        status, names = said["status"], said.get("vectors", [])
-        message = str(said["message"]).encode(errors="replace").decode()[:500]
-        iterations, stages = said.get("iterations"), said.get("stages")
-        times = [said.get(name) for name in ("cpu_s", "setup_s")]
-        history = said.get("history")
+        status, names = reply["status"], reply.get("vectors", [])
+        message = str(reply["message"]).encode(errors="replace").decode()[:500]
+        iterations, stages = reply.get("iterations"), reply.get("stages")
+        times = [reply.get(name) for name in ("cpu_s", "setup_s")]
+        history = reply.get("history")
         right = (
-            status in SAID
+            status in REPORTABLE
             and set(names) <= {*VECTORS, *CERTIFICATE}
             and len(set(names)) == len(names)
             and (iterations is None or type(iterations) is int)
@@ -611,7 +611,7 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
     if not right:
         raise WorkerEnded("garbage", "the worker sent what is no answer")
     record.status, record.message, record.stages = status, message, stages
-    record.warm = said.get("warm") is True
+    record.warm = reply.get("warm") is True
     record.iterations = iterations
     record.cpu_s, record.setup_s = (None if t is None else float(t) for t in times)
     return list(names)
@@ -633,16 +633,16 @@ def check_times(solver: str, record: Record, reported: bool, watch: Watch, outsi
         outside: CPU time [s] of the worker while it had the problem, but not between its messages
             `go` and `done`; it counts too.
     """
-    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + outside
-    record.said_cpu_s = said
-    if said is None:
+    claimed, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + outside
+    record.said_cpu_s = claimed
+    if claimed is None:
         return
     most = seen + SLACK + SHARE * seen
     whole = 0 <= (record.iterations or 0) < 1 << 62
-    if not (0 <= said <= most and 0 <= setup + said <= most + SLACK and whole):
+    if not (0 <= claimed <= most and 0 <= setup + claimed <= most + SLACK and whole):
         record.status = "lied"
         record.message = (
-            f"says that it took {said:g} s and {record.iterations} iterations;"
+            f"says that it took {claimed:g} s and {record.iterations} iterations;"
             f" the kernel saw {seen:.3g} s of CPU time"
         )
         record.iterations = record.iterations if whole else None
@@ -656,7 +656,7 @@ def check_times(solver: str, record: Record, reported: bool, watch: Watch, outsi
         return
     else:
         own = seen - setup
-    if own - said > SLACK + UNSEEN * seen:
+    if own - claimed > SLACK + UNSEEN * seen:
         record.cpu_s = own
 
 
@@ -678,12 +678,12 @@ def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
         record.message += f", for reactions up to {proof.bound:.1e}"
 
 
-def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
+def main(link: int, lifeline: int, folder: str, mark: str, cores: int) -> None:
     """Do the jobs of the campaign at the other end of a socket.
 
     Args:
         link: this end of the socket.
-        alive: the end of a pipe; only the campaign has its other end.
+        lifeline: the end of a pipe; only the campaign has its other end.
         folder: for temporary files of the worker.
         mark: a text in the environment of this process.
         cores: number of cores that the worker gets for itself, if they are free.
@@ -691,8 +691,8 @@ def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
     campaign = Connection(link)
     processes.adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    supervisor = Supervisor(campaign, alive, folder, mark)
-    os.close(alive)
+    supervisor = Supervisor(campaign, lifeline, folder, mark)
+    os.close(lifeline)
     supervisor.cores, held = machine.reserve(cores)
     try:
         while True:

@@ -43,7 +43,7 @@ class Words:
     codes: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, texts: Iterable[Text]) -> Words:
+    def of_texts(cls, texts: Iterable[Text]) -> Words:
         """The column of these texts."""
         places: dict[Text, int] = {}
         codes = [places.setdefault(text, len(places)) for text in texts]
@@ -88,7 +88,7 @@ class Words:
 
     def map(self, function: Callable[[Text], Text]) -> Words:
         """The column with each text replaced by another."""
-        new = Words.of(map(function, self.values))
+        new = Words.of_texts(map(function, self.values))
         return Words(new.values, new.codes[self.codes] if len(self) else self.codes)
 
 
@@ -107,14 +107,14 @@ class Table:
         self._length = lengths.pop() if lengths else 0
 
     @classmethod
-    def of(cls, rows: Iterable[Mapping[str, Any]]) -> Table:
+    def of_rows(cls, rows: Iterable[Mapping[str, Any]]) -> Table:
         """The table of rows with the same keys; a column with any text becomes one of texts."""
         rows = list(rows)
         found: dict[str, Column] = {}
         for name in rows[0] if rows else ():
             values = [row[name] for row in rows]
             if name in TEXTS or any(isinstance(value, str) for value in values):
-                found[name] = Words.of(values)
+                found[name] = Words.of_texts(values)
             else:
                 found[name] = numbers_of(name, values)
         return cls(found)

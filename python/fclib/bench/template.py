@@ -28,7 +28,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fclib import _registry, external
+from fclib import _entry_points, _registry, external
 from fclib.bench import meter, processes
 
 # constants of clone(2) and mount(2)
@@ -48,12 +48,12 @@ class TemplateGone(Exception):  # noqa: N818 (of the surroundings)
 class Template:
     """The supervisor's side of the template."""
 
-    def __init__(self, campaign: socket.socket, alive: int, mark: str, serve: Serve) -> None:
+    def __init__(self, campaign: socket.socket, lifeline: int, mark: str, serve: Serve) -> None:
         """Fork the template.
 
         Args:
             campaign: the supervisor's socket, the template closes it.
-            alive: the end of a pipe; only the campaign has its other end.
+            lifeline: the end of a pipe; only the campaign has its other end.
             mark: a text in the environment of all that the supervisor starts.
             serve: the function that a worker runs.
         """
@@ -64,7 +64,7 @@ class Template:
             try:
                 self.link.close()
                 campaign.close()
-                _run(theirs, alive, supervisor, mark, serve)
+                _run(theirs, lifeline, supervisor, mark, serve)
             finally:
                 os._exit(1)
         theirs.close()
@@ -103,22 +103,22 @@ class Template:
             os.waitpid(self.pid, 0)
 
 
-def _run(link: socket.socket, alive: int, supervisor: int, mark: str, serve: Serve) -> None:
+def _run(link: socket.socket, lifeline: int, supervisor: int, mark: str, serve: Serve) -> None:
     """Fork workers, until the supervisor or the campaign is gone."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     # imports that each worker would need: to unpickle matrices, and to find solvers
     importlib.import_module("scipy.sparse")
-    _registry.entry_points_there()
+    _entry_points.listed(_registry.GROUP)
     external.adapters()
     gc.collect()
     gc.freeze()  # workers do not scan existing objects, so their pages are not copied
     possible = _fork_apart_once()
     looked = select.poll()
     looked.register(link, select.POLLIN)
-    looked.register(alive, 0)  # poll always reports a closed other end
+    looked.register(lifeline, 0)  # poll always reports a closed other end
     while True:
-        if alive in dict(looked.poll()):
+        if lifeline in dict(looked.poll()):
             # a supervisor that is not stopped ends by itself, and this process with it
             time.sleep(PATIENCE)
             break
@@ -157,11 +157,11 @@ def _fork(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> tu
             os._exit(0)
     os.close(writing)
     os.waitpid(between, 0)
-    said = os.read(reading, 1000).decode().partition(" ")
+    reply = os.read(reading, 1000).decode().partition(" ")
     os.close(reading)
-    if not said[0] or said[0] == "0":
-        raise OSError(said[2] or "a worker could not be started")
-    return int(said[0]), said[2] == "1"
+    if not reply[0] or reply[0] == "0":
+        raise OSError(reply[2] or "a worker could not be started")
+    return int(reply[0]), reply[2] == "1"
 
 
 def _begin(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> None:

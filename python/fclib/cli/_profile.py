@@ -121,21 +121,21 @@ def print_profile(
         "along": [] if both is None else profiles.along(store, both, campaign),
         "not run": profiles.failures(faults),
     }
-    said = Said(rows, compared, penalty, shift, weigh, own_set, note)
+    notes = Notes(rows, compared, penalty, shift, weigh, own_set, note)
     if not quiet and as_json:
         report = Report(True)
         for table, records in tables.items():
             for record in records:
                 report.add({"table": table, **record})
     elif not quiet:
-        show(tables, costs, said)
+        show(tables, costs, notes)
     if folder is not None:
-        draw(tables, costs, store, folder, formats, said)
+        draw(tables, costs, store, folder, formats, notes)
         err.print(f"Pictures and tables: {folder}", highlight=False)
 
 
 @dataclasses.dataclass(frozen=True)
-class Said:
+class Notes:
     """The notes of tables and pictures on their runs."""
 
     rows: Table  # all runs asked for
@@ -154,11 +154,11 @@ class Said:
         return f"{words}; {self.note}" if self.note else words
 
 
-def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: Said) -> None:
+def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, notes: Notes) -> None:
     """The tables for readers, grouped by tolerance."""
     words = profiles.METRICS[costs.metric][0]
-    judged = profiles.JUDGED[said.rows.row(0)["merit"]]
-    busy = profiles.loaded(said.rows)
+    judged = profiles.JUDGED[notes.rows.row(0)["merit"]]
+    busy = profiles.loaded(notes.rows)
     titles = {
         "profile": "Performance profile: the share solved within a multiple of the best",
         "shifts": "Means over that of the best, by the shift of the mean",
@@ -168,8 +168,8 @@ def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: S
         part = costs.at(tol)
         here = f"Tolerance {tol:g}"
         out.print(
-            f"{here}. {words}: {said.caption(part)}; shifted geometric means, shift"
-            f" {said.shift:g}, failures as {said.penalty:g} x the limit; {judged}",
+            f"{here}. {words}: {notes.caption(part)}; shifted geometric means, shift"
+            f" {notes.shift:g}, failures as {notes.penalty:g} x the limit; {judged}",
             highlight=False,
         )
         out.print()
@@ -183,7 +183,7 @@ def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: S
             )
         if busy:
             out.print(
-                f"{profiles.LOADED}: {sum(busy.values())} of {len(said.rows)} runs were begun"
+                f"{profiles.LOADED}: {sum(busy.values())} of {len(notes.rows)} runs were begun"
                 " while the load was above the number of cores: their times may be longer than on"
                 " a quiet machine",
                 highlight=False,
@@ -285,7 +285,7 @@ def draw(
     store: Path,
     folder: Path,
     formats: Sequence[str],
-    said: Said,
+    notes: Notes,
 ) -> None:
     """Pictures and CSV files into a folder."""
     from fclib.bench import plots
@@ -295,16 +295,16 @@ def draw(
         if table != "profile":
             write_csv(folder / f"{table.replace(' ', '-')}.csv", records)
     several = len(costs.tolerances) > 1
-    tols = comparison.numbers_in(said.compared, "tol")
+    tols = comparison.numbers_in(notes.compared, "tol")
     for tol in costs.tolerances:
-        part, own = costs.at(tol), said.compared.where(tols == tol)
-        words, ending = said.caption(part), f"-{tol:g}" if several else ""
+        part, own = costs.at(tol), notes.compared.where(tols == tol)
+        words, ending = notes.caption(part), f"-{tol:g}" if several else ""
         name = f"{costs.metric}{ending}"
-        steps = curve_rows(part, profiles.ratios(part.values), "tau", said.weigh)
+        steps = curve_rows(part, profiles.ratios(part.values), "tau", notes.weigh)
         write_csv(folder / f"performance-{name}.csv", steps)
-        steps = curve_rows(part, part.values, costs.metric, said.weigh)
+        steps = curve_rows(part, part.values, costs.metric, notes.weigh)
         write_csv(folder / f"data-{name}.csv", steps)
-        plots.performance(part, folder, formats, words, ending, weigh=said.weigh)
+        plots.performance(part, folder, formats, words, ending, weigh=notes.weigh)
         for per_contact in (False, True):
             plots.data(
                 part,
@@ -313,7 +313,7 @@ def draw(
                 per_contact=per_contact,
                 caption=words,
                 ending=ending,
-                weigh=said.weigh,
+                weigh=notes.weigh,
             )
         longest = float(np.nanmax(comparison.numbers_in(own, "cpu_s"), initial=0.0))
         times = np.geomspace(1e-5, max(longest, 1e-4), 300)
@@ -323,7 +323,7 @@ def draw(
             reached = profiles.runtimes(store, own, tol)
             plots.runtimes(reached, folder, formats, words, ending, legend)
     if several:
-        words = said.caption(costs)
+        words = notes.caption(costs)
         plots.work_precision(tables["work-precision"], costs.metric, folder, formats, words)
 
 

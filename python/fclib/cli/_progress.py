@@ -33,12 +33,12 @@ def many_bars() -> Iterator[Callable[[str, int, int], None]]:
     )
     with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
         tasks: dict[str, Any] = {}
-        said = time.monotonic()
+        last_shown = time.monotonic()
 
         def show(name: str, done: int, total: int) -> None:
-            nonlocal said
-            if not err.is_terminal and time.monotonic() - said > PAUSE:
-                said = time.monotonic()
+            nonlocal last_shown
+            if not err.is_terminal and time.monotonic() - last_shown > PAUSE:
+                last_shown = time.monotonic()
                 err.print(f"{name}: {done} of {total}", highlight=False)
             if name not in tasks:
                 tasks[name] = bars.add_task(name, total=total)
@@ -57,20 +57,20 @@ def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
         MofNCompleteColumn(),
         TextColumn("{task.fields[words]}", markup=False),
     )
-    said = time.monotonic()
+    last_shown = time.monotonic()
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
         task = bar.add_task(name, total=None, words="")
 
         def show(progress: bench.Progress) -> None:
-            nonlocal said
+            nonlocal last_shown
             done = sum(progress.statuses.values())
             left = (progress.planned - progress.done) / progress.rate if done else None
             words = f"{progress.solved} solved, {done - progress.solved} not"
             if left is not None:
                 words += f", {progress.rate:.1f}/s, {duration(left)} left"
             bar.update(task, total=progress.planned, completed=progress.done, words=words)
-            if not quiet and not err.is_terminal and time.monotonic() - said > PAUSE:
-                said = time.monotonic()
+            if not quiet and not err.is_terminal and time.monotonic() - last_shown > PAUSE:
+                last_shown = time.monotonic()
                 err.print(f"{name}: {progress.done} of {progress.planned}, {words}")
 
         yield show

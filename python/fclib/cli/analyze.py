@@ -62,9 +62,9 @@ def store(path: Path, found: Any) -> None:
     )
     values = {key: _attribute(value) for key, value in found.record.items() if value is not None}
     fclib.write_attributes(path, "info", {**kept, **values})
-    for group, said in told.items():
-        if said:
-            fclib.write_attributes(path, group, said)
+    for group, attributes in told.items():
+        if attributes:
+            fclib.write_attributes(path, group, attributes)
 
 
 def _attribute(value: Any) -> float | str:

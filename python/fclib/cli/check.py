@@ -128,7 +128,7 @@ def command(
         try:
             problem = read_owner(path)
             solution = fclib.read_solution(path)
-            if solution is None and (said := fclib.read_attributes(path, "info").get(MARK)):
+            if solution is None and (mark := fclib.read_attributes(path, "info").get(MARK)):
                 report.add(
                     {
                         "problem": str(path),
@@ -139,10 +139,10 @@ def command(
                         "error": None,
                         **dict.fromkeys(PARTS),
                         "mismatches": [],
-                        "says": {MARK: said},
+                        "says": {MARK: mark},
                     }
                 )
-                err.print(f"{path.name}: {said}", highlight=False)
+                err.print(f"{path.name}: {mark}", highlight=False)
                 continue
             if solution is None:
                 raise fclib.FileError(f"{path}: /solution: there is no solution to check")

@@ -41,10 +41,10 @@ from fclib.cli._output import (
     words_of,
 )
 from fclib.cli._progress import many_bars
-from fclib.collections import catalog, library, references, standing
+from fclib.collections import catalog, library, ratings, references
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices, distinct_of, kind_of, problems_of
 from fclib.collections.plan import evenly
+from fclib.collections.set_index import SETS, choices, distinct_of, kind_of, problems_of
 from fclib.collections.verify import LACKING
 
 app = typer.Typer(
@@ -99,7 +99,7 @@ def list_families(
                     "families": len(folders),
                     "problems": sum(map(problems_of, folders)),
                     "distinct": distinct_of(folders),
-                    "what": KNOWN[name][1] if name in KNOWN else "",
+                    "what": SETS[name][1] if name in SETS else "",
                 }
             )
         if not as_json:
@@ -413,12 +413,12 @@ def verify(folder: Folder, as_json: Json = False) -> None:
             out.print(f"{proven} problems are proven to have no solution, and say so")
         if unsolved:
             out.print(f"{unsolved} problems have no known solution, and say so")
-        said = {
+        phrases = {
             "published": "have the data of the published version",
             "differs": "differ from the published version",
             "yours": "are yours: no published trajectory or list has them",
         }
-        for origin, words in said.items():
+        for origin, words in phrases.items():
             if origins[origin]:
                 out.print(f"{origins[origin]} problems {words}")
     raise typer.Exit(int(report.failed))
@@ -474,7 +474,7 @@ def find(
 def status(
     name: Annotated[
         str, typer.Argument(help="A set, or a problem SET/FAMILY/NUMBER.")
-    ] = standing.FIRST,
+    ] = ratings.FIRST,
     only: Annotated[
         Rating | None, typer.Option("--class", help="Each problem of one class.")
     ] = None,
@@ -503,18 +503,17 @@ def status(
             usage_error(ValueError("--out takes one problem: SET/FAMILY/NUMBER"))
         if stores:
             digests = {
-                digest: member.partition("/")[2]
-                for member, digest in standing.members(name).items()
+                digest: member.partition("/")[2] for member, digest in ratings.members(name).items()
             }
             count = 0
             for path in stores:
                 with Store(path, create=False) as store:
-                    count += standing.add(store.results(start="cold"), digests)
+                    count += ratings.add(store.results(start="cold"), digests)
             err.print(f"{count} runs taken in", highlight=False)
-        rows, basis = standing.standings(name)
+        rows, basis = ratings.ratings_of(name)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
-    except (standing.StandingError, fclib.Error, OSError) as error:
+    except (ratings.RatingError, fclib.Error, OSError) as error:
         fail(str(error))
     report = Report(as_json)
     wanted = [row for row in rows if only is None or row.rating == only.value]
@@ -560,7 +559,7 @@ def status(
         )
 
 
-def record_of(row: standing.Standing) -> dict[str, Any]:
+def record_of(row: ratings.RatedProblem) -> dict[str, Any]:
     """A problem and its class, for a table."""
     best = row.best
     return {
@@ -578,25 +577,25 @@ def record_of(row: standing.Standing) -> dict[str, Any]:
 
 def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
     """Show the class of one problem; write it with the best known solution."""
-    rows, _ = standing.standings(name.split("/")[0])
+    rows, _ = ratings.ratings_of(name.split("/")[0])
     found = [row for row in rows if row.id == name]
     if not found:
         fail(
             f"{name}: there is no such problem; fclib collection status names those that there are"
         )
     if target is not None:
-        problem, solution, said = standing.known_solution(name)
-        best = references.given(problem, solution, said["by"], said["date"])
+        problem, solution, finder = ratings.known_solution(name)
+        best = references.given(problem, solution, finder["by"], finder["date"])
         references.write(target, problem, best)
-        err.print(f"error {best.error:.3g}, by {said['by']}, {said['date']}", highlight=False)
+        err.print(f"error {best.error:.3g}, by {finder['by']}, {finder['date']}", highlight=False)
     report = Report(as_json)
     report.add(record_of(found[0]))
     if not as_json:
         out.print(Rows(report.records))
 
 
-@app.command()
-def take(
+@app.command("take")
+def accept(
     files: Annotated[list[Path], typer.Argument(help="FCLIB files with problem and solution.")],
     by: Annotated[str, typer.Option(help="Who found it, and how: a name, a solver, its version.")],
     name: Annotated[
@@ -613,8 +612,8 @@ def take(
     report = Report(as_json)
     for path in files:
         try:
-            taken, error, before = standing.take(path, by, name)
-        except (standing.StandingError, fclib.Error, OSError, KeyError) as reason:
+            taken, error, before = ratings.accept_solution(path, by, name)
+        except (ratings.RatingError, fclib.Error, OSError, KeyError) as reason:
             words = str(reason.args[0]) if isinstance(reason, KeyError) else str(reason)
             err.print(f"fclib: {words}", style="red", highlight=False)
             report.add({"problem": str(path), "taken": False, "error": None, "before": None}, False)

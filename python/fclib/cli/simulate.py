@@ -36,7 +36,7 @@ def command(
     scene: Annotated[
         Path,
         typer.Argument(
-            help="An MJCF file, a URDF file, or the folder of a deck of LMGC90, DATBOX.",
+            help="An MJCF file, a URDF file, an input.dat of Siconos, or an LMGC90 deck (DATBOX).",
             show_default=False,
         ),
     ],
@@ -125,6 +125,15 @@ def command(
             show_default=False,
         ),
     ] = None,
+    friction: Annotated[
+        float | None,
+        typer.Option(
+            help="Of an input.dat, which does not have it.",
+            metavar="MU",
+            min=0.0,
+            show_default=False,
+        ),
+    ] = None,
     merit: Merit = MeritKind.both,
     unsolved: Annotated[
         Unsolved,
@@ -137,7 +146,7 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF, a URDF or a deck, and store its problems.
+    """Simulate a model or a deck, and store its problems.
 
     What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.
@@ -173,6 +182,7 @@ def command(
         "--ignore": ignore,
         "--floating": floating,
         "--ground": ground is not None,
+        "--friction": friction is not None,
     }
     is_deck = scene.is_dir()
     for name, given in only_files.items():
@@ -209,6 +219,7 @@ def command(
                 activation=activation,
                 floating=floating,
                 ground=ground,
+                friction=friction,
             )
             if theta is not None:
                 loaded = replace(loaded, theta=theta)

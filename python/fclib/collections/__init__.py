@@ -12,22 +12,23 @@ the steps of the family's scene that have a contact, or the problems of a family
 directly.
 
 plan.py       which problems of a family are built, and which are kept; their license and citation
-trajectory.py stored states, from which problems are assembled, and their files
+trajectory.py stored states, from which problems are assembled, and their files. Needs handed.py
+handed.py     problems of states that another engine handed over, with its contacts
 published.py  the trajectories of all published versions. Needs trajectory.py
-known.py      the sets, their versions and their families; lists of chosen problems in data/
+set_index.py  the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem, in catalog.parquet. Needs no other module
 references.py solutions: finds them, judges them by both maps, stores them. Needs catalog.py
 build.py      makes the files of a family; goes on after a kill. Needs plan.py, references.py and
-              standing.py
+              ratings.py
 verify.py     compares files with the catalogue, and judges solutions again
-add.py        takes existing files in as a set. Needs build.py, known.py, references.py
+add.py        takes existing files in as a set. Needs build.py, set_index.py, references.py
 figures.py    distributions and pictures
-archives.py   publish and get. Needs catalog.py, known.py
+archives.py   publish and get. Needs catalog.py, set_index.py
 guesses.py    a guess for the next step's problem, from a solution
 sequence.py   consecutive problems, with guesses. Needs guesses.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
-standing.py   which problems are easy, hard or open, by stored runs. Needs known.py
+ratings.py    which problems are easy, hard or open, by stored runs. Needs set_index.py
 
 How the lists of data/ were chosen is in workshop/sets of the repository.
 """
@@ -37,7 +38,12 @@ from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
 from fclib.collections.guesses import guess_of
-from fclib.collections.known import (
+from fclib.collections.library import Collection, load
+from fclib.collections.plan import Plan, Selection, Simulation, families
+from fclib.collections.published import VersionError, file_name
+from fclib.collections.record import record
+from fclib.collections.sequence import Step, sequence
+from fclib.collections.set_index import (
     folders,
     fresh_plan,
     from_folder,
@@ -47,11 +53,6 @@ from fclib.collections.known import (
     sets,
     version,
 )
-from fclib.collections.library import Collection, load
-from fclib.collections.plan import Plan, Selection, Simulation, families
-from fclib.collections.published import VersionError, file_name
-from fclib.collections.record import record
-from fclib.collections.sequence import Step, sequence
 from fclib.collections.trajectory import Trajectory, TrajectoryError
 from fclib.collections.trajectory import read as read_trajectory
 from fclib.collections.verify import verify

@@ -22,7 +22,7 @@ from typing import Any
 
 from fclib import _core
 from fclib._judge import MARK, TOLERANCE, judge
-from fclib.collections import catalog, known, references
+from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
 from fclib.collections.references import Found
@@ -81,7 +81,7 @@ def add(
     if not source.is_dir():
         raise NotADirectoryError(f"{source}: is no folder")
     collection = plain(name or source.name)
-    if collection in known.sets() or collection in known.KNOWN:
+    if collection in set_index.sets() or collection in set_index.SETS:
         raise ValueError(f"{collection}: is the name of a published set; choose another (--name)")
     families: dict[str, list[Path]] = {}
     for path in sorted(source.rglob("*")):
@@ -95,7 +95,7 @@ def add(
     refused: list[Refusal] = []
     for family, paths in families.items():
         part = Part(source, out, collection, family, rules or Rules())
-        for done, refusal in enumerate(part.take(paths), 1):
+        for done, refusal in enumerate(part.add_files(paths), 1):
             refused += [refusal] if refusal is not None else []
             report(f"{collection}/{family}", done, len(paths))
         catalog.gather(out)
@@ -125,13 +125,13 @@ class Part:
             for row in table.to_pylist():
                 self.rows[row["source"], row["source_sha256"]] = row
 
-    def take(self, paths: Sequence[Path]) -> Iterator[Refusal | None]:
+    def add_files(self, paths: Sequence[Path]) -> Iterator[Refusal | None]:
         """Take files in. For each, return None, or the reason why it is left out."""
         last = time.monotonic()
         try:
             for path in paths:
                 try:
-                    self._take(path)
+                    self._add_file(path)
                     refusal = None
                 except (_core.Error, OSError) as error:
                     # an error in writing the collection is not a fault of the file
@@ -155,7 +155,7 @@ class Part:
             return
         catalog.write_catalog(self.catalogue, self.rows.values())
 
-    def _take(self, path: Path) -> None:
+    def _add_file(self, path: Path) -> None:
         key = path.relative_to(self.source).as_posix(), catalog.sha256(path)
         row = self.rows.get(key)
         if row is not None and all(

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 from fclib.collections import catalog, trajectory
-from fclib.collections.known import folders
+from fclib.collections.set_index import folders
 
 REGISTRY = "registry.txt"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives

@@ -34,7 +34,7 @@ import numpy as np
 from fclib import _core, _digest, _solve, scenes
 from fclib._judge import TOLERANCE
 from fclib._origin import origin_of
-from fclib.collections import catalog, references, standing, trajectory
+from fclib.collections import catalog, ratings, references, trajectory
 from fclib.collections.catalog import STATE
 from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
@@ -290,13 +290,12 @@ def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> It
         return Item(plan.scene.problem(number), number)
     place = states.index(number)
     part = states.problem(place)
-    bodies = int(np.unique(states.model.trees[part.dofs]).size)
     return Item(
         part.problem,
         int(states.step[place]),
         states.time(place),
-        bodies,
-        states.model.left_out,
+        states.moved(part),
+        states.left_out,
     )
 
 
@@ -341,7 +340,7 @@ def build_scene(
         from fclib.collections import figures
 
         if states is not None:
-            figures.draw_scene(states.model, folder)
+            figures.draw_states(states, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
     _core.sync_files(folder)
     return list(kept.rows.values())
@@ -363,10 +362,10 @@ def reference(plan: Plan, problem: Any) -> Found | None:
     found = references.find(problem, plan.solver, plan.tol, **plan.options)
     # somebody may know a better solution of an open problem
     if not found.ok and not found.refuted:
-        stored = standing.stored_solution(_digest.digest(problem))
+        stored = ratings.stored_solution(_digest.digest(problem))
         if stored is not None:
-            solution, said = stored
-            other = references.given(problem, solution, said["by"], said["date"])
+            solution, finder = stored
+            other = references.given(problem, solution, finder["by"], finder["date"])
             other = references.finished(problem, other)
             found = other if other.error < found.error else found
     return references.certified(problem, found) if plan.certify and found.ok else found
@@ -522,7 +521,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         **dict.fromkeys(
             ("open", "stick", "slide", "solver", "status", "tol", "error", "has_solution")
         ),
-        "rating": standing.classes(plan.collection).get(facts["digest"]),
+        "rating": ratings.classes(plan.collection).get(facts["digest"]),
         "left_out": "; ".join(item.left_out) or None,
         **rights_of(plan),
     }

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
-from fclib._meant import meant as suggestion
+from fclib._suggest import suggestion
 
 FILE = "catalog.parquet"
 PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fclib.collections.handed import drawing
+
 if TYPE_CHECKING:
+    from fclib.collections.trajectory import Trajectory
     from fclib.simulate import Model
 
 BINS = 40
@@ -17,6 +21,18 @@ MEASURES = (
     ("n", "degrees of freedom"),
     ("density", "contact components for a degree of freedom"),
 )
+
+
+def draw_states(states: Trajectory, folder: Path) -> Path | None:
+    """Write scene.png, the state that was assembled last; None if nothing can draw here."""
+    if states.handed is None:
+        return draw_scene(states.model, folder)
+    try:
+        from fclib.simulate import model_of
+    except ImportError:  # these states need no MuJoCo but for this picture
+        return None
+    xml = drawing(states.handed, states.scene, states.position[-1])
+    return draw_scene(model_of(replace(states.scene, xml=xml)), folder)
 
 
 def draw_scene(model: Model, folder: Path) -> Path | None:

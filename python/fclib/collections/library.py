@@ -13,7 +13,7 @@ from typing import Any, overload
 
 from fclib import _core
 from fclib._solve import Problem
-from fclib.collections import archives, catalog, known, published
+from fclib.collections import archives, catalog, published, set_index
 from fclib.collections.build import Progress, build
 
 FOLDER = "FCLIB_COLLECTION"  # environment variable: the folder, instead of the user's cache
@@ -45,7 +45,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
     """
     part = folder / name / catalog.FILE
     if part.is_file():
-        wanted, found = known.version_of(name), version_in(part)
+        wanted, found = set_index.version_of(name), version_in(part)
         # the version of a user's own set is a name, not a number that could be older
         if found is not None and found.isdecimal() and found != wanted:
             raise published.VersionError(
@@ -59,7 +59,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
     if source:
         archives.get([name], source, folder)
     else:
-        build([known.plan_of(name)], folder, pictures=False, progress=progress)
+        build([set_index.plan_of(name)], folder, pictures=False, progress=progress)
 
 
 def folders_in(folder: Path, name: str) -> list[str]:
@@ -93,12 +93,12 @@ class Collection(Sequence[Problem]):
         """If there is no such set or family, a KeyError lists the known names."""
         self.name = name
         # a set in the package needs no module that handles folders
-        ours = name.split("/")[0] in known.sets()
+        ours = name.split("/")[0] in set_index.sets()
         own = [] if ours else folders_in(Path(folder) if folder else default_folder(), name)
-        self.folders = own or known.folders([name])
-        shipped = all(own.split("/")[0] in known.SHIPPED for own in self.folders)
+        self.folders = own or set_index.folders([name])
+        shipped = all(own.split("/")[0] in set_index.SHIPPED for own in self.folders)
         if shipped:
-            self.folder = known.DATA
+            self.folder = set_index.DATA
         else:
             self.folder = Path(folder) if folder is not None else default_folder()
         self._catalog: Any = None
@@ -167,9 +167,9 @@ class Collection(Sequence[Problem]):
         found._catalog = table.filter(catalog.arrow().array(kept, "bool"))
         found._places = None
         words = rows if isinstance(rows, str) else getattr(rows, "__name__", "...")
-        said = [] if rows is None else [words]
-        said += [f"{name}={wanted!r}" for name, wanted in columns.items()]
-        found._filters = (*self._filters, ", ".join(said))
+        words = [] if rows is None else [words]
+        words += [f"{name}={wanted!r}" for name, wanted in columns.items()]
+        found._filters = (*self._filters, ", ".join(words))
         return found
 
     def to_pandas(self) -> Any:
@@ -275,10 +275,10 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
         raise KeyError(
             f"a problem is named SET/FAMILY/NUMBER, not {str(name)!r}; fclib.read reads a file"
         )
-    if parts[0] in known.SHIPPED:
+    if parts[0] in set_index.SHIPPED:
         # this needs no module that reads catalogues
         for own in (form,) if form else FORMS:
-            path = known.DATA / f"{name}-{own}.hdf5"
+            path = set_index.DATA / f"{name}-{own}.hdf5"
             if path.is_file():
                 return _core.read(path)
     older = older_versions(name)
@@ -293,7 +293,7 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
 def older_versions(name: str) -> list[str]:
     """The stored versions of a list that have a problem which the present one lacks."""
     own, _, number = name.rpartition("/")
-    listed = known.choices(own.partition("/")[0])
+    listed = set_index.choices(own.partition("/")[0])
     if not listed or not number.isdecimal():
         return []
     there = any(f"{own.partition('/')[0]}/{c.family}/{c.number:04d}" == name for c in listed)

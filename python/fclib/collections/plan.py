@@ -223,14 +223,20 @@ def evenly(total: int, count: int | None) -> npt.NDArray[np.int64]:
 
 def origin(scene: Source) -> dict[str, Any]:
     """The values that decide a source's problems, in JSON's types."""
-    known = {"scene": scene.name, "parameters": dict(scene.parameters), "seed": scene.seed}
+    known = {
+        "scene": scene.name,
+        **scenes.identity_of(scene.name),
+        "parameters": dict(scene.parameters),
+        "seed": scene.seed,
+    }
     if isinstance(scene, scenes.Assembled):
         return known
-    # the version of the simulator decides the numbers
-    from fclib.simulate import engine
+    if scene.xml or scene.solids is not None:
+        # the version of the simulator decides the numbers
+        from fclib.simulate import engine
 
+        known |= engine(scene)
     return known | {
-        **engine(scene),
         **({"keyframe": scene.keyframe} if scene.keyframe else {}),
         "restitution": scene.restitution,
         "law": scene.law,
@@ -249,8 +255,8 @@ def origin(scene: Source) -> dict[str, Any]:
 
 @functools.cache
 def is_ours(scene: str) -> bool:
-    """Whether a scene has the name of a family."""
-    return scene in families()
+    """Whether a scene has the name of a family of fclib's own."""
+    return scene in scenes.own()
 
 
 def rights_of(plan: Plan) -> dict[str, str | None]:
@@ -267,8 +273,8 @@ def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -
     The facts on existence and uniqueness come after those that the family states.
     """
     if facts:
-        said = info.math_info.rstrip(". ")
-        info = info.replace(math_info=f"{said}. {facts}" if said else facts)
+        stated = info.math_info.rstrip(". ")
+        info = info.replace(math_info=f"{stated}. {facts}" if stated else facts)
     *words, last = info.description.split("\n")
     try:
         told: Any = json.loads(last)

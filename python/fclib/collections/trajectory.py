@@ -23,6 +23,11 @@ library:
     sketch.bin          (K x 13 x 2) float64, little-endian: two sums of each matrix's entries with
                         signs, in the order of `_digest.FIELDS`; NaN if there is no such matrix
 
+of states that another engine handed over (`handed.py`), with C contacts in all, also:
+
+    point.bin (C x 3), normal.bin (C x 3), gap.bin (C)      integers of the quantum, as they are
+    count.bin (K), body.bin (C x 2), feature.bin (C)        int32, little-endian
+
 Integers are stored as second differences along K, those of one coordinate one after the other, in
 zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first: 4.5 MB for
 the 4,934 states of RT-0444's families; as floats of 32 bits they take 7.8 MB.
@@ -40,12 +45,14 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from lzma import LZMAError
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _digest
+from fclib import _core, _digest
+from fclib.collections import handed as engines
+from fclib.collections.handed import Handed
 from fclib.scenes import Scene
 from fclib.scenes.shared.interaction import Course, Drive, Interaction
 from fclib.scenes.shared.solids import Bed, Block, HexMesh, Load, Solids, Surface
@@ -67,10 +74,23 @@ DIFFERENCES: Final = 2  # order of differences along the steps
 # arrays of a trajectory, with a row for each state
 ARRAYS: Final = ("number", "step", "position", "velocity", "sketch")
 HEXES: Final = ("digest", "structure")
+# arrays of contacts that another engine handed over, and the one with a row for each state
+NUMBERS: Final = ("point", "normal", "gap")
+INTEGERS: Final = ("count", "body", "feature")
 
 
 class TrajectoryError(ValueError):
     """A file is not a trajectory, or this version cannot read it."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """The problem of a state of another engine, which has no model."""
+
+    problem: _core.GlobalProblem
+
+
+Assembled: TypeAlias = "StepProblem | Told"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +110,7 @@ class Trajectory:
     digest: tuple[str, ...] = ()  # (K) `fclib.digest` of the problems at publication
     structure: tuple[str, ...] = ()  # (K) digests of their patterns
     sketch: Vector = field(default_factory=lambda: np.zeros((0, len(_digest.FIELDS), 2)))
+    handed: Handed | None = None  # bodies and contacts of another engine that made the states
 
     def __len__(self) -> int:
         return len(self.number)
@@ -125,15 +146,38 @@ class Trajectory:
             raise KeyError(f"version {self.origin['version']} has no problem {name}")
         return place
 
+    @property
+    def time_step(self) -> float:
+        """H [s]."""
+        if self.scene.time_step is not None:
+            return self.scene.time_step
+        return float(self.model.time_step)
+
     def time(self, place: int) -> float:
         """The time at the start of a state's step [s]."""
-        return float(self.step[place] * self.model.time_step)
+        return float(self.step[place] * self.time_step)
 
-    def problem(self, place: int) -> StepProblem:
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the problems do not have of the scene."""
+        return () if self.handed is not None else tuple(self.model.left_out)
+
+    def moved(self, part: Assembled) -> int:
+        """The number of bodies that the contacts of a problem move."""
+        if self.handed is not None:
+            return int(part.problem.n) // engines.TWIST
+        return int(np.unique(self.model.trees[part.dofs]).size)  # type: ignore[union-attr]
+
+    def problem(self, place: int) -> Assembled:
         """The problem of a state, by its place 0, 1, ..., K - 1; nothing is solved.
 
         If the scene cannot be assembled, it raises as `fclib.simulate.simulate` does.
         """
+        if self.handed is not None:
+            number, step = int(self.number[place]), int(self.step[place])
+            own = engines.info_of(self.scene, self.origin, number, step)
+            state = self.position[place], self.velocity[place]
+            return Told(self.handed.problem(place, *state, self.time_step, own))
         from fclib.simulate import geometry_of, problem_at
 
         info = self.words(int(self.step[place]), number=int(self.number[place]))
@@ -159,6 +203,7 @@ def part(states: Trajectory, numbers: Iterable[int], collection: str, version: s
     places = [states.index(number) for number in sorted(numbers)]
     values: dict[str, Any] = {name: getattr(states, name)[places] for name in ARRAYS}
     values |= {name: tuple(getattr(states, name)[i] for i in places) for name in HEXES}
+    values["handed"] = states.handed.taken(places) if states.handed is not None else None
     origin = {**states.origin, "collection": collection, "version": version}
     return replace(states, origin=origin, **values)
 
@@ -195,9 +240,15 @@ def write(path: Path, trajectory: Trajectory) -> None:
     """
     arrays: dict[str, bytes] = {}
     shapes: dict[str, Any] = {}
-    for name in ("position", "velocity"):
-        values = getattr(trajectory, name)
-        arrays[name], width = packed(values, trajectory.exponent)
+    columns = [(name, getattr(trajectory, name), DIFFERENCES) for name in ("position", "velocity")]
+    if trajectory.handed is not None:
+        # contacts that follow each other are no steps
+        columns += [(name, getattr(trajectory.handed, name), 0) for name in NUMBERS]
+        for name in INTEGERS:
+            arrays[name] = getattr(trajectory.handed, name).astype("<i4").tobytes()
+    for name, values, order in columns:
+        values = values.reshape(len(values), -1)
+        arrays[name], width = packed(values, trajectory.exponent, order)
         shapes[name] = {"shape": list(values.shape), "bytes": width}
     arrays["number"] = trajectory.number.astype("<i8").tobytes()
     arrays["step"] = trajectory.step.astype("<i8").tobytes()
@@ -211,6 +262,7 @@ def write(path: Path, trajectory: Trajectory) -> None:
         "problems": len(trajectory),
         "arrays": shapes,
         "scene": record(trajectory.scene),
+        **({"handed": trajectory.handed.head()} if trajectory.handed is not None else {}),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists():
@@ -280,8 +332,17 @@ def read(path: Path) -> Trajectory:
         }
         count, exponent = head["problems"], head["exponent"]
 
-        def states(name: str) -> Vector:
-            return unpacked(arrays[name], **head["arrays"][name], exponent=exponent)
+        def states(name: str, order: int = DIFFERENCES) -> Vector:
+            known = head["arrays"][name]
+            return unpacked(arrays[name], **known, exponent=exponent, order=order)
+
+        def contacts() -> Handed | None:
+            if "handed" not in head:
+                return None
+            own: dict[str, Any] = {name: states(name, 0) for name in NUMBERS}
+            own |= {name: np.frombuffer(arrays[name], "<i4").astype(int) for name in INTEGERS}
+            own |= {"gap": own["gap"].ravel(), "body": own["body"].reshape(-1, 2)}
+            return engines.of(head["handed"], **own)
 
         def hexes(name: str) -> tuple[str, ...]:
             return tuple(arrays[name][32 * i : 32 * i + 32].hex() for i in range(count))
@@ -299,13 +360,17 @@ def read(path: Path) -> Trajectory:
             sketch=np.frombuffer(arrays["sketch"], "<f8")
             .astype(float)
             .reshape(count, len(_digest.FIELDS), 2),
+            handed=contacts(),
         )
 
 
-def packed(values: Vector, exponent: int) -> tuple[bytes, int]:
-    """Multiples of 2^exponent (K x m) as bytes, and the number of bytes for each."""
+def packed(values: Vector, exponent: int, order: int = DIFFERENCES) -> tuple[bytes, int]:
+    """Multiples of 2^exponent (K x m) as bytes, and the number of bytes for each.
+
+    The integers are differences of this order along K.
+    """
     integers = np.rint(np.ldexp(values, -exponent)).astype(np.int64)
-    for _ in range(DIFFERENCES):
+    for _ in range(order):
         integers = np.diff(integers, axis=0, prepend=np.zeros((1, integers.shape[1]), np.int64))
     zigzag = ((integers << 1) ^ (integers >> 63)).T.astype("<u8", order="C")
     planes = zigzag.view(np.uint8).reshape(-1, 8).T
@@ -315,14 +380,16 @@ def packed(values: Vector, exponent: int) -> tuple[bytes, int]:
     return planes[:width].tobytes(), width
 
 
-def unpacked(data: bytes, *, shape: list[int], bytes: int, exponent: int) -> Vector:
+def unpacked(
+    data: bytes, *, shape: list[int], bytes: int, exponent: int, order: int = DIFFERENCES
+) -> Vector:
     """The multiples (K x m) that `packed` has made into bytes."""
     rows, columns = shape
     planes = np.zeros((8, rows * columns), dtype=np.uint8)
     planes[:bytes] = np.frombuffer(data, np.uint8).reshape(bytes, rows * columns)
     zigzag = np.ascontiguousarray(planes.T).view("<u8").reshape(columns, rows).T.astype(np.uint64)
     integers = (zigzag >> np.uint64(1)).astype(np.int64) ^ -(zigzag & np.uint64(1)).astype(np.int64)
-    for _ in range(DIFFERENCES):
+    for _ in range(order):
         integers = np.cumsum(integers, axis=0)
     values: Vector = np.ldexp(integers.astype(float), exponent)
     return values

@@ -11,7 +11,7 @@ from typing import Any
 
 from fclib import _core, _digest
 from fclib._judge import Judgement, judge
-from fclib.collections import catalog, known, published, trajectory
+from fclib.collections import catalog, published, set_index, trajectory
 
 LACKING = ("unfinished", "not listed")  # statuses of entries that a catalogue lacks
 ROUNDING = 1e-9  # relative difference of a matrix that is allowed on another machine
@@ -79,7 +79,7 @@ def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, A
     if problem.formulation == row["formulation"]:
         if _digest.digest(problem) != row["digest"]:
             return Verdict(name, path, "wrong digest", None, f"{file}: holds another problem")
-        origin = known.origin_of(row)
+        origin = set_index.origin_of(row)
         if origin == "differs":
             apart = distance(problem, row)
             worst = max(apart, key=apart.__getitem__) if apart else "all of it"
@@ -126,8 +126,8 @@ def distance(problem: Any, row: Mapping[str, Any]) -> dict[str, float]:
     `Trajectory.differences` estimates it. If only the digest is known, the result is empty.
     """
     folder = f"{row['collection']}/{row['family']}"
-    if row["collection"] in known.SHIPPED:
-        shipped = known.DATA / f"{folder}/{row['number']:04d}"
+    if row["collection"] in set_index.SHIPPED:
+        shipped = set_index.DATA / f"{folder}/{row['number']:04d}"
         for form in ("global", "local"):
             path = shipped.with_name(f"{shipped.name}-{form}.hdf5")
             if path.is_file():

@@ -266,9 +266,9 @@ class Worker:
             process.stdin.flush()
         line = self._read_line(time_left)
         if line is None:
-            spent = _cpu_time(process.pid) - start
+            cpu = _cpu_time(process.pid) - start
             self.end()
-            return json.dumps({"info": None, "cpu_s": spent}).encode()
+            return json.dumps({"info": None, "cpu_s": cpu}).encode()
         return line
 
     def _read_line(self, time_left: float) -> bytes | None:

@@ -14,6 +14,7 @@ import json
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,70 @@ def recorded(file: Path, version: str) -> Recorded:
         contacts=contacts,
         notes=("The velocity and the reaction are those that Siconos' solver returned.",),
         more={"solve_cpu_s": float(known["solve_cpu_s"])},
+    )
+
+
+@dataclass(frozen=True)
+class Told:
+    """A step of a scene of rigid bodies, as Siconos' mechanics and Bullet told it."""
+
+    start: float  # time at the start of the step [s]
+    h: float  # [s]
+    number: Any  # (nb) Siconos' numbers of the moving bodies
+    position: Any  # (nb x 7) place and quaternion w, x, y, z
+    velocity: Any  # (nb x 6) velocity, and the spin in the body's own axes
+    mass: Any  # (nb x 6 x 6) in the same components
+    # (nc x 2) places in `number`; the normal points to the second; -1 first: something fixed
+    body: Any
+    feature: Any  # (nc) Siconos' number of the contact, the same as long as it lasts
+    point: Any  # (nc x 3) at which both bodies have their levers: on the second one
+    normal: Any  # (nc x 3)
+    gap: Any  # (nc)
+    mu: Any  # (nc)
+    reaction: Any  # (3 nc) in Siconos' frames
+    W: Any  # (3 nc x 3 nc) of a local problem; None of a global one
+    q: Any
+
+
+def told(file: Path) -> Told:
+    """The bodies and contacts of a step that _siconos_steps.py wrote.
+
+    Siconos builds its tangents such that T1 is not at right angles to N if a contact is tilted
+    about two axes. So only the normal components of W, q and the reaction are those of the true
+    frames. Of a contact that Bullet is about to give up, point and normal may not be those in W.
+
+    Raises:
+        ValueError: it has none: the scene is not of rigid bodies, or not of Siconos' mechanics.
+        OSError, EOFError: the file is not whole.
+    """
+    with np.load(file) as data:
+        known: dict[str, Any] = dict(data)
+    if "points" not in known:
+        raise ValueError(f"{file}: its scene has no rigid bodies of Siconos' mechanics")
+    h, rows = float(known["h"]), known["points"]
+    number = known["positions"][:, 0].astype(int)
+    order = np.argsort(number)
+    # the two numbers are equal where the other side is fixed
+    second, first = (
+        order[np.searchsorted(number[order], rows[:, k].astype(int))] for k in (23, 24)
+    )
+    fixed = rows[:, 23] == rows[:, 24]
+    return Told(
+        start=float(known["end"]) - h,
+        h=h,
+        number=number,
+        position=known["positions"][:, 1:],
+        velocity=known["velocities"][:, 1:],
+        mass=known["masses"],
+        body=np.column_stack((np.where(fixed, -1, first), second)),
+        feature=rows[:, 22].astype(int),
+        point=rows[:, 1:4],
+        normal=rows[:, 7:10] / np.linalg.norm(rows[:, 7:10], axis=1, keepdims=True),
+        gap=rows[:, 13],
+        mu=known["mu"],
+        reaction=known["r"],
+        W=columns(known, "W") if "W_data" in known else None,
+        q=known["q"],
     )
 
 

@@ -30,6 +30,7 @@ except ImportError as error:
 # warning of Siconos' own conversions
 warnings.filterwarnings("ignore", message=".*scipy.sparse.coo")
 NO_INDEX_SET = 999  # Siconos' number for a problem without an index set
+SPATIAL = 6  # degrees of freedom of a rigid body in space
 
 
 class Steps:
@@ -91,6 +92,32 @@ def globally(osns: Any) -> Any:
     return arrays, problem
 
 
+def places(osns: Any) -> Any:
+    """Contacts and rigid bodies before the solve, as Siconos' mechanics tells them.
+
+    positions (nb x 8) and velocities (nb x 7) have the number of the body first; points (nc x 25)
+    is what `MechanicsIO.contactPoints` gives; masses (nb x 6 x 6) are in the bodies' own axes.
+    Nothing if the scene is of another kind.
+    """
+    try:
+        from siconos.io.io_base import MechanicsIO
+    except ImportError:
+        return {}
+    system = osns.simulation().nonSmoothDynamicalSystem()
+    told = MechanicsIO()
+    positions = told.positions(system)
+    points = told.contactPoints(system, osns.indexSetLevel())
+    systems = system.dynamicalSystemsVector()
+    if positions is None or points is None or {s.dimension() for s in systems} != {SPATIAL}:
+        return {}
+    return {
+        "positions": np.array(positions),
+        "velocities": np.array(told.velocities(system)),
+        "points": np.array(points),
+        "masses": np.array([np.array(s.mass()) for s in systems]),
+    }
+
+
 def writing(original: Any, told: Any, steps: Steps) -> Any:
     """A class of friction problems that writes the problems that it solves."""
 
@@ -116,16 +143,16 @@ def writing(original: Any, told: Any, steps: Steps) -> Any:
                 nc, dimension = problem.numberOfContacts, problem.dimension
                 simulation = self.simulation()
                 arrays |= {"mu": np.array(problem.mu)[:nc], "dimension": dimension}
-                arrays |= {"end": now, "h": simulation.timeStep()}
+                arrays |= {"end": now, "h": simulation.timeStep(), **places(self)}
             start = time.process_time()
             info: int = self.solve()
-            spent = time.process_time() - start
+            cpu = time.process_time() - start
             if arrays:
                 m = dimension * nc
                 arrays |= {"r": np.array(self.z())[:m], "u": np.array(self.w())[:m]}
                 if hasattr(self, "globalVelocities"):
                     arrays["v"] = np.array(self.globalVelocities())[: len(arrays["q"])]
-                steps.write(arrays | {"solve_cpu_s": spent})
+                steps.write(arrays | {"solve_cpu_s": cpu})
             self.postCompute()
             return info
 

@@ -12,8 +12,8 @@ view.py        the content of the page of one problem, and that page by itself
 network.py     bodies and contacts: places from the file, from H if that is safe, or a graph
 solids.py      shapes of bodies at their places, from the file
 picture.py     a small picture of the bodies
-drawn.py       the drawings of each problem on the site
-taking.py      the files of a problem that the site offers
+drawings.py    the drawings of each problem on the site
+downloads.py   the files of a problem that the site offers
 browser.py     the module with which its pages check and solve problems
 serving.py     serves a site at an address of this machine
 recipes.py     lines to copy: how to get, read and solve a problem
@@ -23,8 +23,8 @@ libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError
 assets/        the pages themselves: HTML, CSS, JavaScript
 
-site.py needs all others but paper.py; drawn.py needs view.py and picture.py, these two solids.py,
-and view.py network.py; paper.py needs runs.py.
+site.py needs all others but paper.py; drawings.py needs view.py and picture.py, these two
+solids.py, and view.py network.py; paper.py needs runs.py.
 """
 
 from fclib.report.error import ReportError

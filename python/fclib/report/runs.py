@@ -208,7 +208,8 @@ class Campaigns:
             groups[instance.family].append(k)
         tables = {"": profiles.summary(costs, weigh=WEIGH)}
         tables |= {
-            family: profiles.summary(costs.of(own), weigh=WEIGH) for family, own in groups.items()
+            family: profiles.summary(costs.on_instances(own), weigh=WEIGH)
+            for family, own in groups.items()
         }
         found: dict[str, Any] = {}
         if costs.values.size <= BANDED:

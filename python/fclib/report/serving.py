@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import quote
 
 from fclib.collections.catalog import sha256
-from fclib.report import browser, taking
+from fclib.report import browser, downloads
 from fclib.report.error import ReportError
 from fclib.report.site import MARK, described_merits
 from fclib.report.view import write_view
@@ -118,7 +118,7 @@ def panel_of(file: Path, kind: str, solved: bool, module: Path | None) -> dict[s
     """
     own: dict[str, Any] = {"what": kind, "path": file.name, "kind": kind, "sha256": sha256(file)}
     address = f"files/{quote(os.fsencode(file.name))}"  # a name may hold bytes that are no text
-    own |= {"href": address, "merit": taking.merit_of(file) if solved else None}
+    own |= {"href": address, "merit": downloads.merit_of(file) if solved else None}
     return {
         "merits": described_merits(),
         "module": browser.size(module) if module else 0,

@@ -6,7 +6,7 @@
     data/files/1.js               digests, files and citations of rows 100 to 199
     data/t0.js  data/t0-cpu_s.js  statuses, and costs by a metric, at the first tolerance
     data/problems/12.js           the runs of the problem in row 12 of the catalogue
-    data/views/  thumbs/          pictures; drawn.py
+    data/views/  thumbs/          pictures; drawings.py
     pictures/SET/FAMILY/          of the catalogue
     files/                        the problems themselves, if that is asked for
     assets/browser/               the core that checks and solves them on a page; browser.py
@@ -34,9 +34,9 @@ from fclib.bench.campaign import described
 from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.bench.table import object_in
-from fclib.collections import families, read_catalog, sets, standing
-from fclib.collections.known import kind_of
-from fclib.report import browser, citing, drawn, taking
+from fclib.collections import families, ratings, read_catalog, sets
+from fclib.collections.set_index import kind_of
+from fclib.report import browser, citing, downloads, drawings
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
@@ -174,8 +174,8 @@ def build_site(
     out.parent.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
-        taken = taking.Taking(part, problems.folder, with_files, files_at)
-        writer = _Writer(part, campaigns, problems, views, title, progress, taken, jobs)
+        offered = downloads.Downloads(part, problems.folder, with_files, files_at)
+        writer = _Writer(part, campaigns, problems, views, title, progress, offered, jobs)
         writer.docs = docs.rstrip("/")
         writer.module = found
         counts = writer.write()
@@ -219,17 +219,17 @@ class Problems:
             if not row["formulation"].startswith("G"):
                 # a local problem does not know its bodies
                 row |= {"n": None, "density": None}
-        self.standings = self._rate()
+        self.ratings = self._rate()
 
     def _rate(self) -> dict[str, Any]:
         """The class of each problem from stored runs, and its basis, by set."""
         found: dict[str, Any] = {}
-        rated: dict[str, standing.Standing] = {}
-        named = {str(row.get("collection")) for row in self.rows} | {standing.FIRST}
+        rated: dict[str, ratings.RatedProblem] = {}
+        named = {str(row.get("collection")) for row in self.rows} | {ratings.FIRST}
         for name in sorted(named & set(sets())):
             try:
-                rows, basis = standing.standings(name)
-            except (standing.StandingError, OSError):
+                rows, basis = ratings.ratings_of(name)
+            except (ratings.RatingError, OSError):
                 continue  # the package of stored runs is not here
             if basis is not None:
                 found[name] = (rows, basis)
@@ -327,10 +327,10 @@ class _Writer:
         views: int | None,
         title: str,
         progress: Callable[[str, int, int], None],
-        taken: taking.Taking,
+        offered: downloads.Downloads,
         jobs: int | None,
     ) -> None:
-        self.taking = taken
+        self.downloads = offered
         self.jobs = jobs
         self.docs = ""
         self.module: Path | None = None
@@ -343,7 +343,7 @@ class _Writer:
         self.bytes = 0
 
     def put(self, name: str, value: Any) -> None:
-        self.bytes += drawn.put(self.folder, name, value)
+        self.bytes += drawings.put(self.folder, name, value)
 
     def write(self) -> dict[str, int]:
         (self.folder / "assets").mkdir()
@@ -373,24 +373,26 @@ class _Writer:
         views, steps = self._views()
         site["families"] = self._families(steps)
         site["views"] = views
-        site["standings"] = _standings(self.problems.standings)
+        site["ratings"] = _records_of_classes(self.problems.ratings)
         here = {row["id"] for row in self.problems.rows}
         site["known"] = [
             one["problem"]
-            for own in site["standings"]
+            for own in site["ratings"]
             for one in own["open"]
             if one["problem"] in here
         ]
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
         site["problems"] = len(self.problems.rows)
         site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
-        site["files"] = self.taking.kind
+        site["files"] = self.downloads.kind
         site["module"] = browser.copy(self.module, self.folder) if self.module else 0
         if self.module:
             site["libraries"].append(browser.READER)
-        for first in range(0, len(self.problems.rows), taking.CHUNK):
-            rows = self.problems.rows[first : first + taking.CHUNK]
-            self.put(f"files/{first // taking.CHUNK}", [self.taking.record(row) for row in rows])
+        for first in range(0, len(self.problems.rows), downloads.CHUNK):
+            rows = self.problems.rows[first : first + downloads.CHUNK]
+            self.put(
+                f"files/{first // downloads.CHUNK}", [self.downloads.record(row) for row in rows]
+            )
         self.put("catalogue", {"size": len(self.problems.rows), "columns": self.problems.columns()})
         self.put("site", site)
         return {
@@ -493,14 +495,14 @@ class _Writer:
         for k in there:
             file = files[k]
             assert file is not None
-            tasks.append(drawn.Task(k, file, k in chosen, self.taking.picture(rows[k])))
+            tasks.append(drawings.Task(k, file, k in chosen, self.downloads.picture(rows[k])))
         found = []
-        for done, one in enumerate(drawn.draw_all(self.folder, tasks, self.jobs)):
+        for done, one in enumerate(drawings.draw_all(self.folder, tasks, self.jobs)):
             self.progress("pictures", done + 1, len(tasks))
             self.bytes += one.bytes
             rows[one.place] |= {"view": one.view, "thumb": one.thumb}
             found.append(one)
-        steps, size = drawn.sequences(self.folder, found, rows)
+        steps, size = drawings.sequences(self.folder, found, rows)
         self.bytes += size
         return sum(one.view for one in found), steps
 
@@ -554,7 +556,7 @@ def described_merits() -> list[list[str | None]]:
     return [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS]
 
 
-def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _records_of_classes(known: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The content of the page of classes, by set."""
     found = []
     for name, (rows, basis) in known.items():

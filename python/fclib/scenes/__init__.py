@@ -6,6 +6,9 @@ found by a scan; nothing else names it. `shared/family.py` says what a family mu
 package `shared` holds what families are made with. A variant of a family is a subclass of it, in
 its file or in one of its own (`chute.py`, `rolling_chute.py`).
 
+An installed package adds families by the entry point group ``fclib.families``: a class, or a
+module with classes. They are used like those of this folder (`shared/added.py`).
+
     >>> import fclib.scenes
     >>> sorted(fclib.scenes.families())
     ['BoxesStack']
@@ -14,13 +17,13 @@ its file or in one of its own (`chute.py`, `rolling_chute.py`).
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import pkgutil
 from typing import Any
 
-from fclib._meant import meant
+from fclib._suggest import suggestion
+from fclib.scenes.shared import added
 from fclib.scenes.shared.family import Assembled, Assembly, Described, Family, Law, Scene, parameter
 
 __all__ = [
@@ -49,17 +52,31 @@ def assemblies() -> dict[str, type[Assembly]]:
 
 @functools.cache
 def found() -> tuple[tuple[str, Any], ...]:
-    """The dataclasses of this folder's files, by name."""
+    """All families, by name: those of this folder, and those that installed packages add."""
+    members = own()
+    return tuple(sorted({**added.families(members), **members}.items()))
+
+
+@functools.cache
+def own() -> dict[str, Any]:
+    """The families of this folder's files, by name."""
     members: dict[str, Any] = {}
     for module_info in pkgutil.iter_modules(__path__):
-        if module_info.ispkg:  # what families share
-            continue
-        module = importlib.import_module(f"{__name__}.{module_info.name}")
-        for name, member in vars(module).items():
-            own = isinstance(member, type) and member.__module__ == module.__name__
-            if own and dataclasses.is_dataclass(member):
-                members[name] = member
-    return tuple(sorted(members.items()))
+        if not module_info.ispkg:  # a package has what families share
+            module = importlib.import_module(f"{__name__}.{module_info.name}")
+            members |= added.families_of(module)
+    return members
+
+
+def identity_of(name: str) -> dict[str, str]:
+    """What decides the problems of a family, beside its parameters, its seed and fclib's version.
+
+    Of a family of another package it is its file.
+    """
+    others = dict(found())
+    if name in own() or name not in others:
+        return {}
+    return {"family_sha256": added.digest_of_source(others[name])}
 
 
 def get(name: str) -> type[Family]:
@@ -67,7 +84,7 @@ def get(name: str) -> type[Family]:
     known = families()
     if name not in known:
         raise KeyError(
-            f"no family of scenes is called {name!r}; {meant(name, known)}"
+            f"no family of scenes is called {name!r}; {suggestion(name, known)}"
             f"there is: {', '.join(known)}"
         )
     return known[name]

@@ -35,8 +35,8 @@ class Aqueduct:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 60
-    allowance: ClassVar[bool] = False  # as published
-    # of a scene of this kind that is quickly simulated
+    allowance: ClassVar[bool] = False  # its published states have none
+    # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"spans": 2, "tiers": 1}
 
     spans: int = parameter(3, "1", "arches of a tier, at least 2")
@@ -150,10 +150,10 @@ class Aqueduct:
         )
 
     def _joints(self, name: str) -> list[float]:
-        """Where a stone is divided across, y [m].
+        """The places at which a stone is divided across, y [m].
 
-        Two stones that meet never have their joints at the same place: front and back halves that
-        only meet in an edge must not touch.
+        Two stones that meet never have their joints at the same place. Otherwise a front half and a
+        back half would meet in an edge only, and such stones must not touch.
         """
         kind = name.rstrip("0123456789.")
         odd = int(name[-1]) % 2 == 1

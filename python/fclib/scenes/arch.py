@@ -14,7 +14,7 @@ from fclib.scenes.shared.family import Scene, parameter
 class Arch:
     """Equal voussoirs laid to a circular arch on two abutments; the right one moves away.
 
-    Every joint has four contacts, one in each corner: three suffice to hold a stone, so that the
+    Every joint has four contacts, one in each corner. Three are enough to hold a stone, so the
     reactions are far from unique. Under its own weight a semicircular arch stands if its thickness
     is more than 0.107 of the radius of its middle line (P. Couplet 1730, M. Milankovitch 1907;
     0.106 in J. Heyman, The safety of masonry arches, International Journal of Mechanical Sciences
@@ -31,7 +31,7 @@ class Arch:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     voussoirs: int = parameter(24, "1", "number of voussoirs, at least 2")
     radius: float = parameter(2.0, "m", "radius of the middle line")

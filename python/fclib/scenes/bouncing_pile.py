@@ -27,7 +27,7 @@ class BouncingPile:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 200
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(100, "1", "number of spheres, at least 1")
     across: int = parameter(4, "1", "spheres of a layer along x and along y, at least 1")

@@ -32,7 +32,7 @@ class BoxesStack:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1514
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     boxes: int = parameter(50, "1", "number of boxes, at least 1")
     size: float = parameter(2.0, "m", "edge of a box")

@@ -33,7 +33,7 @@ class Bridge:
     friction: ClassVar[str] = "Coulomb, the same coefficient between stones; wheels without"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     voussoirs: int = parameter(9, "1", "number of voussoirs, at least 3")
     slabs: int = parameter(6, "1", "number of slabs of the deck, at least 1")

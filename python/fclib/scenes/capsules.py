@@ -31,7 +31,7 @@ class Capsules:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1705
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     capsules: int = parameter(100, "1", "number of capsules, at least 1")
     length: float = parameter(5.0, "m", "length of a capsule, caps included")
@@ -71,7 +71,7 @@ class Capsules:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the directions and the velocities."""
         random = np.random.Generator(np.random.PCG64(seed))
-        # one row a capsule, drawn at once: more capsules begin like fewer
+        # a random row for each capsule, all drawn at once: more capsules begin like fewer
         draws = random.uniform(-1.0, 1.0, size=(self.capsules, 5))
         heading, rise = math.pi * draws[:, 0], self.tilt * draws[:, 1]
         directions = np.column_stack(

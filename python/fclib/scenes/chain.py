@@ -43,7 +43,7 @@ class Chain:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1514
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     links: int = parameter(11, "1", "number of links, the held one among them, at least 2")
     length: float = parameter(13.7, "m", "length of the chain")

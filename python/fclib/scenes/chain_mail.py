@@ -18,10 +18,10 @@ class ChainMail:
 
     The outer rings are fast. A ball falls onto the net, which sags until its rings are taut.
 
-    Worth having: no joint, contacts alone hold it together, one to three for each pair of rings.
-    What the ball weighs goes through long chains of contacts to the edge, a few times larger than
-    it is where the net is flat. So a small error far inside is a large one at the edge, and local
-    methods need many sweeps.
+    Why it is here: it has no joint; contacts alone hold it together, one to three for each pair of
+    rings. Long chains of contacts carry the weight of the ball to the edge. There the forces are a
+    few times larger than in the flat part of the net. So a small error far inside becomes a large
+    one at the edge, and local methods need many sweeps.
     """
 
     title: ClassVar[str] = "Net of rings"
@@ -31,7 +31,7 @@ class ChainMail:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     across: int = parameter(6, "1", "flat rings of a row and of a column, the fast ones too, >= 3")
     spacing: float = parameter(0.05, "m", "from a flat ring to the next one")

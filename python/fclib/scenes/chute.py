@@ -35,7 +35,7 @@ class Chute:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     grains: int = parameter(240, "1", "number of grains, at least 1")
     spheres: float = parameter(0.25, "1", "share of the grains that are spheres, in [0, 1]")

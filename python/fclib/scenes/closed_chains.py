@@ -32,7 +32,7 @@ class ClosedChains:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     chains: int = parameter(5, "1", "number of chains, at least 1")
     links: int = parameter(10, "1", "rods of a chain, at least 3")

@@ -35,7 +35,7 @@ class CubesH8:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
     problems: ClassVar[int] = 40
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     elements: int = parameter(5, "1", "elements along an edge of a cube, at least 1")
     size: float = parameter(1.0, "m", "edge of the lower cube")
@@ -60,7 +60,7 @@ class CubesH8:
     theta: float = parameter(0.5, "1", "theta of the scheme, in [1/2, 1]")
     time_step: float = parameter(5e-3, "s", "time step h")
 
-    # of a scene of this kind that is quickly simulated
+    # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {}
 
     def __post_init__(self) -> None:

@@ -33,7 +33,7 @@ class FourBar:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     linkages: int = parameter(3, "1", "number of linkages, at least 1")
     blocks: int = parameter(3, "1", "blocks of the stack before a linkage, at least 1")
@@ -128,7 +128,7 @@ class FourBar:
         return 2 * self.block
 
     def _angles(self, angle: float) -> tuple[Pair, Pair, float, float]:
-        """End of the crank, pivot of the rocker, and the angles of coupler and rocker [rad]."""
+        """The end of the crank, the pivot of the rocker, the angles of coupler and rocker [rad]."""
         end = (self.crank * math.cos(angle), self.crank * math.sin(angle))
         span = math.hypot(self.frame - end[0], end[1])
         slope = math.atan2(-end[1], self.frame - end[0])
@@ -138,7 +138,7 @@ class FourBar:
         return end, (self.frame, 0.0), slope + inner, slope + math.pi - outer
 
     def _foot(self, angle: float) -> float:
-        """Where the foot is along x [m], the crank at an angle."""
+        """The place of the foot along x [m] for an angle of the crank."""
         *_, rocker = self._angles(angle)
         return self.frame - self._leg * math.cos(rocker)
 

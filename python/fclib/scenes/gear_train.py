@@ -21,13 +21,13 @@ IRON = "0.45 0.47 0.5 1"
 class GearTrain:
     """Involute gears mesh in a row; each hangs on a fixed pin, with play in its bore.
 
-    Worth having: few degrees of freedom and many contacts. One to two pairs of teeth mesh at a
+    Why it is here: few degrees of freedom and many contacts. One to two pairs of teeth mesh at a
     time, and the load jumps from one to two and back; with the pins each gear is held by three to
     five contacts, which come and go. A tooth changes flank when the play is passed, with an impact
     that runs through the whole train.
 
-    The first gear is driven by a motor, the last one turns against a damper. Without friction the
-    torques are as the numbers of teeth; the mean speeds are so with friction too.
+    A motor drives the first gear, and a damper brakes the last one. The mean speeds of the gears
+    follow from the numbers of teeth. Without friction so do the torques.
 
     The involute: L. Euler, De aptissima figura rotarum dentibus tribuenda, Novi Commentarii
     academiae scientiarum Petropolitanae 5, 1760.
@@ -40,7 +40,7 @@ class GearTrain:
     friction: ClassVar[str] = "Coulomb, one coefficient for teeth and pins"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     gears: int = parameter(5, "1", "number of gears, at least 2")
     teeth: int = parameter(18, "1", "teeth of the first gear, and of every second one, at least 12")

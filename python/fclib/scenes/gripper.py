@@ -39,7 +39,7 @@ class Gripper:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "robots"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     blocks: int = parameter(5, "1", "blocks in the row, at least 1")
     height: float = parameter(0.08, "m", "height and width of a block")

@@ -22,15 +22,15 @@ TIP = 0.3  # height of the tips above the floor, in heights of the object
 class Hand:
     """Fingers of two links reach down around a prism with as many sides, press on it and lift it.
 
-    The hinges are driven by torques, and nothing tells them where they are: what holds the object
-    holds the fingers. A finger presses with its tip, so the object may turn about the line of two
+    Torques drive the hinges, and no servo knows their angles: the object alone keeps the fingers in
+    their places. A finger presses with its tip, so the object may turn about the line of two
     tips, and roll between them. The least force of a tip that carries the object is m g / (k mu)
     for k fingers; it is `squeeze` times that here, and below 1 the object slips out.
 
-    Worth having: few contacts, each of which counts. The grasp holds by internal forces: it is
-    statically indeterminate, and most contacts are near their limit of friction. In a step in which
-    a tip begins to slip or to roll the solution is far from the one before. Links are lighter than
-    the object by far.
+    Why it is here: few contacts, each of which counts. The grasp holds by internal forces: it is
+    statically indeterminate, and most contacts are near their limit of friction. If
+    a tip begins to slip or to roll in a step, the solution is far from the one before. The links
+    are far lighter than the object.
 
     J. K. Salisbury, B. Roth, Kinematic and force analysis of articulated mechanical hands, Journal
     of Mechanisms, Transmissions, and Automation in Design 105, 1983.
@@ -43,7 +43,7 @@ class Hand:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     fingers: int = parameter(6, "1", "number of fingers and of the object's sides, at least 3")
     size: float = parameter(0.04, "m", "from the object's axis to its sides")

@@ -115,7 +115,7 @@ class Humanoid:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere; limits without friction"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     height: float = parameter(1.7, "m", "height of the body")
     mass: float = parameter(70.0, "kg", "mass of the body, without the stones")

@@ -40,12 +40,12 @@ class Jammed:
     (1e-3 in the two largest), and as forces y they balance (H y = 0). The law is that of gaps: a
     step must open all overlaps. With y the sum of forces times gaps is below 0: no velocity does
     that, there is no solution, and y proves it. The radii are then made smaller. At `released` = 1
-    this sum is 0: jamming. Above it y proves nothing, and from where all gaps are open there is a
+    this sum is 0: jamming. For larger values y proves nothing. Once all gaps are open there is a
     solution.
 
-    Worth having: the contacts are just as many as hold the spheres, so that W is as near to
-    singular as a packing makes it. Reactions of all sizes go through long chains, and the margin
-    between a solution and none is as small as one likes.
+    Why it is here: there are just enough contacts to hold the spheres, so that W is as near to
+    singular as it can be for a packing. Reactions of all sizes go through long chains, and the
+    margin between a solution and none can be made as small as one likes.
 
     C. S. O'Hern, L. E. Silbert, A. J. Liu, S. R. Nagel, Jamming at zero temperature and zero
     applied stress: the epitome of disorder, Physical Review E 68, 2003.

@@ -35,7 +35,7 @@ class KaplasTower:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 201
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     levels: int = parameter(12, "1", "number of rings, at least 1")
     planks: int = parameter(12, "1", "planks of a ring, at least 5")

@@ -33,7 +33,7 @@ class LowWall:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 50
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     stretchers: int = parameter(3, "1", "length of the wall in stretchers and a half, at least 2")
     courses: int = parameter(5, "1", "number of courses, at least 1; the lowest is of headers")

@@ -17,9 +17,9 @@ from fclib.scenes.shared.solids import Block, Load, Solids
 class LowWallFEM:
     """Dry blocks in running bond on a rigid floor, each meshed coarsely.
 
-    The wall is pressed by its weight and on its top, where a wave of further pressure passes, and
-    is sheared by a push along its top. Every second course ends in half blocks; head joints have a
-    small gap that the seed draws.
+    Its weight and a pressure on its top press the wall. A wave of further pressure passes along the
+    top, and a push along the top shears the wall. Every second course ends in half blocks; head
+    joints have a small gap that the seed draws.
 
     After the set LowWall_FEM of the published FCLIB library, made by LMGC90, a shear test on a low
     wall. All sizes, the material, the loads and the step are chosen here.
@@ -34,8 +34,8 @@ class LowWallFEM:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
     problems: ClassVar[int] = 50
-    allowance: ClassVar[bool] = False  # as published
-    # of a scene of this kind that is quickly simulated
+    allowance: ClassVar[bool] = False  # its published states have none
+    # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"courses": 2, "length": 2}
 
     courses: int = parameter(5, "1", "number of courses, at least 1")
@@ -76,7 +76,7 @@ class LowWallFEM:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the gaps of the head joints."""
         random = np.random.Generator(np.random.PCG64(seed))
-        # one row a course, drawn at once: a higher wall begins like a lower one
+        # a random row for each course, all drawn at once: a higher wall begins like a lower one
         gaps = self.joint * random.uniform(0.0, 1.0, size=(self.courses, self.length + 1))
         blocks: list[Block] = []
         top: list[int] = []

@@ -15,8 +15,8 @@ RATIOS = (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # of the top course to the lowest
 class MassRatios:
     """One pushed wall in running bond, the masses of its courses in geometric progression.
 
-    Heavy bodies on light ones are what splitting methods suffer from most: an error below is one of
-    the ratio above.
+    Splitting methods suffer most from heavy bodies on light ones: an error in a light body below
+    means an error in the heavy one above that is larger by the ratio of the masses.
     """
 
     title: ClassVar[str] = "Wall with heavy courses on light ones"

@@ -19,8 +19,9 @@ ICE, RUBBER = 0.02, 1.2
 class MixedFriction:
     """A wall of blocks, pushed at the top, with another coefficient of friction at each contact.
 
-    Of each size four have ln(mu) drawn from a normal distribution of growing spread about ln of the
-    median, and a last one has joints of ice and of rubber in turn.
+    There are five walls of each size. For four of them ln(mu) is drawn from a normal distribution
+    about ln of the median, with a spread that grows from wall to wall. The fifth has joints of ice
+    and of rubber in turn.
     """
 
     title: ClassVar[str] = "Mixed friction"

@@ -14,8 +14,8 @@ class NewtonsCradle:
     """Equal balls on rods, each on a hinge of its own; the first ones swing into the others.
 
     With a gap between the balls impacts come one after the other, and with e = 1 as many balls
-    leave as came in. Without one all are simultaneous, and Newton's law does what it says rather
-    than what balls do: all that stood leave together, each at 2/n of the speed, and the ball that
+    leave as came in. Without a gap all impacts are simultaneous, and Newton's law differs from real
+    balls: all balls that were at rest leave together, each at 2/n of the speed, and the ball that
     struck comes back at (n - 2)/n.
     """
 
@@ -26,7 +26,7 @@ class NewtonsCradle:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 60
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     balls: int = parameter(7, "1", "number of balls, at least 2")
     struck: int = parameter(1, "1", "how many swing in, at least 1")

@@ -33,7 +33,7 @@ class PeriodicBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 220
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     polyhedra: int = parameter(100, "1", "number of polyhedra, at least 1")
     shapes: int = parameter(25, "1", "polyhedra that differ, at least 1")

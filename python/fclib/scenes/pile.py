@@ -30,7 +30,7 @@ class Pile:
     frame, and comes apart. Without one, the line through the two contacts of a sphere in the lowest
     of two layers is 22.5 degrees off their normals: two layers stand from mu = tan 22.5 = 0.414 on.
 
-    Worth having: the weight of all that is above goes through long chains of contacts, and how it
+    Why it is here: the weight of all that is above goes through long chains of contacts, and how it
     spreads over ground and frame is far from unique.
     """
 

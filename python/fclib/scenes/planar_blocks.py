@@ -26,7 +26,7 @@ class PlanarBlocks:
     friction: ClassVar[str] = "Coulomb in the plane, the same coefficient everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     courses: int = parameter(10, "1", "number of courses, at least 1")
     blocks: int = parameter(5, "1", "blocks of a course, at least 1; a half more in every second")

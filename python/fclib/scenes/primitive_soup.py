@@ -40,7 +40,7 @@ class PrimitiveSoup:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 240
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     bodies: int = parameter(120, "1", "number of bodies, at least 1")
     radius: float = parameter(1.0, "m", "of the ball in which a body fits")

@@ -37,7 +37,7 @@ class Pusher:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "robots"
     problems: ClassVar[int] = 1000
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     blocks: int = parameter(40, "1", "number of blocks, at least 1")
     across: int = parameter(4, "1", "blocks side by side before the blade, at least 1")

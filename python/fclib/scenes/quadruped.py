@@ -45,7 +45,7 @@ class Quadruped:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     crank: float = parameter(0.06, "m", "length of a crank; the legs are in proportion")
     mass: float = parameter(8.0, "kg", "mass of the trunk")

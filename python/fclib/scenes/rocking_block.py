@@ -28,7 +28,7 @@ class RockingBlock:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 300
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     width: float = parameter(0.2, "m", "of the block")
     height: float = parameter(2.0, "m", "of the block")

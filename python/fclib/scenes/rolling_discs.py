@@ -29,7 +29,7 @@ class RollingDiscs:
     friction: ClassVar[str] = "Coulomb and rolling in the plane, the same coefficients everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 350
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     discs: int = parameter(80, "1", "number of discs, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a disc")
@@ -55,7 +55,7 @@ class RollingDiscs:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the radii and the offsets."""
         random = np.random.Generator(np.random.PCG64(seed))
-        # one row a disc, drawn at once: more discs begin like fewer
+        # a random row for each disc, all drawn at once: more discs begin like fewer
         draws = random.uniform(size=(self.discs, 3))
         radii = self.radius * (1 - self.spread * draws[:, 0])
         # offsets of a fifth of the radius leave no overlap

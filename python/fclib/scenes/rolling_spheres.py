@@ -30,7 +30,7 @@ class RollingSpheres:
     friction: ClassVar[str] = "Coulomb and rolling, the same coefficients everywhere"
     collection: ClassVar[str] = "rolling"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(100, "1", "number of spheres, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a sphere")
@@ -59,7 +59,7 @@ class RollingSpheres:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the radii, the offsets and the coefficients."""
         random = np.random.Generator(np.random.PCG64(seed))
-        # one row a sphere, drawn at once: more spheres begin like fewer
+        # a random row for each sphere, all drawn at once: more spheres begin like fewer
         draws = random.uniform(size=(self.spheres, 3))
         radii = self.radius * (1 - self.spread * draws[:, 0])
         # after all others, so that these stay; a contact has the larger of its two

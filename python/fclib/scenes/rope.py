@@ -26,7 +26,7 @@ class Rope:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 120
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     over: int = parameter(24, "1", "links on the drum, at least 4")
     short: int = parameter(10, "1", "links of the shorter end, at least 1")

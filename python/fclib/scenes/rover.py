@@ -23,13 +23,13 @@ class Rover:
     On each side a rocker turns about the hull; it has the front wheel, and a bogie with the two
     others. A differential turns one rocker as far down as the other goes up, which holds the hull
     level between them. So all six wheels touch uneven ground. A motor turns each wheel, and lets it
-    slip if friction does not suffice. On even ground the wheels carry the weight by the lever
+    slip if the friction is too small. On even ground the wheels carry the weight by the lever
     rule.
 
-    Worth having: a mechanism with joints and a closed loop stands on free bodies that are not at
-    rest. The masses differ by a factor of a hundred. Wheels that spin slide in a direction that
-    friction itself decides, and stones wedge between wheel and ground, where several solutions may
-    exist.
+    Why it is here: a mechanism with joints and a closed loop stands on free bodies that are not at
+    rest. The masses differ by a factor of a hundred. Friction itself decides the direction
+    in which a spinning wheel slides. If a stone wedges between wheel and ground, several solutions
+    may exist.
 
     The suspension: D. B. Bickler, US patent 4,840,394, 1989.
     """
@@ -41,7 +41,7 @@ class Rover:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 1000
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     stones: int = parameter(80, "1", "number of stones, 0 for even ground")
     across: int = parameter(8, "1", "stones side by side, at least 1")

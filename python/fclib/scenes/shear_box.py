@@ -25,9 +25,9 @@ class ShearBox:
     that stand until they buckle. The macroscopic friction is the force that drives the box over
     the load. Rigid grains have no scale of stress, so it is the same for all loads.
 
-    Worth having: the packing is dense and its network of contacts just rigid; most contacts stick,
-    a few slide, and these change from step to step. Chains of force make it ill-conditioned. The
-    plates have many contacts each and are heavier than a grain by far.
+    Why it is here: the packing is dense, and its network of contacts is just rigid. Most contacts
+    stick; a few slide, and these change from step to step. Chains of force make it ill-conditioned.
+    Each plate has many contacts and is far heavier than a grain.
 
     GDR MiDi, On dense granular flows, European Physical Journal E 14, 2004. F. da Cruz, S. Emam,
     M. Prochnow, J.-N. Roux, F. Chevoir, Rheophysics of dense granular materials, Physical Review
@@ -41,7 +41,7 @@ class ShearBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 800
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     across: int = parameter(24, "1", "discs side by side, at least 4")
     layers: int = parameter(10, "1", "layers of discs, at least 2")

@@ -30,7 +30,7 @@ class Silo:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 250
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     discs: int = parameter(160, "1", "number of discs, at least 1")
     across: int = parameter(8, "1", "discs from wall to wall, at least 2")

@@ -36,7 +36,7 @@ class SliderCrank:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     sliders: int = parameter(4, "1", "number of slider-cranks on the shaft, at least 1")
     crank: float = parameter(0.05, "m", "length of a crank, below that of the rod")

@@ -31,7 +31,7 @@ class Spheres:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 200
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(250, "1", "number of spheres, at least 1")
     radius: float = parameter(1.0, "m", "radius of a sphere")

@@ -31,8 +31,8 @@ class SpheresBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 32
-    allowance: ClassVar[bool] = False  # as published
-    # of a scene of this kind that is quickly simulated
+    allowance: ClassVar[bool] = False  # its published states have none
+    # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"spheres": 36, "along_x": 4, "along_y": 3}
 
     spheres: int = parameter(945, "1", "number of spheres, at least 1")

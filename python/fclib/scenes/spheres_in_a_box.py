@@ -29,7 +29,7 @@ class SpheresInABox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 240
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(150, "1", "number of spheres, at least 1")
     radius: float = parameter(1.0, "m", "largest radius of a sphere")
@@ -55,7 +55,7 @@ class SpheresInABox:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the radii, and the places in their cells."""
         random = np.random.Generator(np.random.PCG64(seed))
-        # one row a sphere, drawn at once: more spheres begin like fewer
+        # a random row for each sphere, all drawn at once: more spheres begin like fewer
         draws = random.uniform(size=(self.spheres, 4))
         radii = self.radius * (1 - self.spread * draws[:, 0])
         pitch = 2 * self.radius + self.gap

@@ -16,7 +16,7 @@ class SpinningBodies:
     """Flat ellipsoids that fall spinning into a box.
 
     The gyroscopic moment is taken at the end of a step: M has h times its derivative, and neither M
-    nor W is symmetric. The law of the velocity is as in other families.
+    nor W is symmetric. The law on velocities is that of the other families.
     """
 
     title: ClassVar[str] = "Spinning bodies"
@@ -26,7 +26,7 @@ class SpinningBodies:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 150
-    allowance: ClassVar[bool] = False  # as published
+    allowance: ClassVar[bool] = False  # its published states have none
 
     bodies: int = parameter(48, "1", "number of bodies, at least 1")
     across: int = parameter(4, "1", "bodies of a layer along x and along y, at least 1")

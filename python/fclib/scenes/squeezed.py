@@ -67,7 +67,7 @@ class Squeezed:
                     normals.append(unit if forwards else -unit)
                     body = line[k] if forwards else line[-1]
                     points.append(centres[body] - self.radius * unit * (1 if forwards else -1))
-                    # all in the first contact: half in each wall loses a digit
+                    # the first contact has all of it: half of it for each wall would lose a digit
                     w.append(-closing if axis == 0 and k == 0 else 0.0)
         masses = np.full(side**3, 2500 * 4 / 3 * np.pi * self.radius**3)
         bodies = assembly.Bodies(

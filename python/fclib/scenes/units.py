@@ -16,8 +16,8 @@ MASSES = (1e-3, 1.0, 1e3)  # unit of mass [kg]
 class Units:
     """One pushed wall in running bond, whose numbers are those of other units.
 
-    The mechanics is one and the same. Moments and forces differ in scale by the unit of length,
-    reactions and velocities by that of mass.
+    The mechanics is the same for all. The unit of length changes the scale of moments relative to
+    forces, and the unit of mass that of reactions relative to velocities.
     """
 
     title: ClassVar[str] = "Wall in other units"

@@ -154,7 +154,7 @@ class Walker(Humanoid):
         return [*self.angles(1, time), *self.angles(-1, time)]
 
     def _held(self, limb: Limb, rest: float) -> str:
-        # a servo's gear turns with the joint; arms rest where they hold the bar
+        # a servo's gear turns with the joint; the arms rest in the pose in which they hold the bar
         return 'armature="0.05"' if driven(limb) else super()._held(limb, 0.0)
 
 

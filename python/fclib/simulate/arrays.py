@@ -66,7 +66,7 @@ def transposed_times(matrix: Sparse, x: Vector) -> Vector:
     return np.asarray(sums, dtype=float)
 
 
-def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
+def submatrix(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
     """The columns of these numbers; -1 means an empty one. `rows` has the new number of each row.
 
     All entries must lie in rows that have a number.

@@ -21,7 +21,7 @@ from fclib.simulate.arrays import (
     columns_of,
     empty,
     lengths_of,
-    take,
+    submatrix,
     without_zeros,
 )
 
@@ -71,9 +71,9 @@ class Equalities:
         """
         if not d.ne:
             return empty((rows.shape[0], 0)), np.zeros(0)
-        gradients = take(rows, np.arange(d.ne))
+        gradients = submatrix(rows, np.arange(d.ne))
         kept = self.kept(d, gradients)
-        G = take(gradients, kept)
+        G = submatrix(gradients, kept)
         return consistent(G, d.efc_pos[: d.ne][kept], self.rounding(d)[kept])
 
     def kept(self, d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
@@ -111,7 +111,7 @@ class Equalities:
 
     def of_columns(self, d: Any, rows: Sparse) -> tuple[list[str], Vector]:
         """The name of the equality of each column of G, and its largest rounding error."""
-        kept = self.kept(d, take(rows, np.arange(d.ne)))
+        kept = self.kept(d, submatrix(rows, np.arange(d.ne)))
         return [self.name(i) for i in d.efc_id[: d.ne][kept]], self.rounding(d)[kept]
 
     def name(self, i: int) -> str:

@@ -92,7 +92,7 @@ from fclib.simulate.arrays import (
     by_columns,
     columns_of,
     lengths_of,
-    take,
+    submatrix,
     times,
     transposed_times,
 )
@@ -322,7 +322,7 @@ class MoreauJean:
             if self.allowance:
                 active = active[ends(contacts[active], closed[active])]
             if len(active) < len(contacts):
-                contacts, H = contacts[active], take(H, block_columns(active, d))
+                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
                 before = before[active]
             w_n = self.restitution * before
         else:
@@ -332,7 +332,7 @@ class MoreauJean:
             undone: Vector | float = self.stabilization
             if contacts.interaction is not None:
                 active, undone = self.seen(contacts.interaction, middle)
-                contacts, H = contacts[active], take(H, block_columns(active, d))
+                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
                 middle = middle[active]
             share = np.where(middle > 0, 1.0, undone)
             w_n = share * middle / h
@@ -366,12 +366,12 @@ class MoreauJean:
             # contacts that move nothing else are none
             new = np.full(len(f), -1, dtype=np.int32)
             new[kept] = np.arange(len(kept), dtype=np.int32)
-            M, H, G = (rows_of(matrix, new) for matrix in (take(M, kept), H, G))
+            M, H, G = (rows_of(matrix, new) for matrix in (submatrix(M, kept), H, G))
             f, tree = f[kept], tree[kept]
             touching = np.flatnonzero(lengths_of(H.indptr).reshape(-1, d).any(axis=1))
             if len(touching) < len(contacts):
                 columns = block_columns(touching, d)
-                contacts, H, w = contacts[touching], take(H, columns), w[columns]
+                contacts, H, w = contacts[touching], submatrix(H, columns), w[columns]
         if self.all_bodies:
             inside, rows = np.arange(len(f)), np.arange(len(b))
         else:
@@ -385,8 +385,8 @@ class MoreauJean:
             place[inside] = np.arange(len(inside), dtype=np.int32)
             all_M, all_G = M, G
             # nothing couples the bodies inside the problem to those outside
-            M, G = take(M, inside, place), take(G, rows, place)
-            H = take(H, np.arange(H.shape[1]), place)
+            M, G = submatrix(M, inside, place), submatrix(G, rows, place)
+            H = submatrix(H, np.arange(H.shape[1]), place)
         fields: dict[str, Any] = {
             "M": M,
             "H": H,

@@ -31,7 +31,7 @@ from fclib.simulate.arrays import (
     Vector,
     lengths_of,
     pointers,
-    take,
+    submatrix,
     without_zeros,
 )
 from fclib.simulate.drives import Drives
@@ -133,7 +133,7 @@ class MujocoModel:
         # MuJoCo's own step keeps the earlier controls
         m.actuator_delay[:] = 0
 
-        self._gait = Gait.of(scene, m)
+        self._gait = Gait.of_scene(scene, m)
         self.controlled = False  # controls come from outside: they are part of the configuration
         self.keyframe = keyframe_of(scene, m)
         if self.keyframe:
@@ -244,7 +244,7 @@ class MujocoModel:
             contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
         if self._meetings:
             kept, contacts = self._meetings.taken(contacts)
-            H = take(H, block_columns(kept, contacts.dimension))
+            H = submatrix(H, block_columns(kept, contacts.dimension))
         G, violation = self._ties.columns(d, rows)
         if self._gait:
             # at the end of the step, as its springs are
@@ -487,7 +487,7 @@ def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
     of_joints = kind == FRICTION_DOF
     which = np.flatnonzero(of_joints | (kind == FRICTION_TENDON))
     which = which[lengths_of(rows.indptr)[which] > 0]
-    gradient = take(rows, which)
+    gradient = submatrix(rows, which)
     index = d.efc_id[which]
     joint = of_joints[which]
     inverse = np.zeros(len(which))
@@ -609,7 +609,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
         rolls = np.flatnonzero(dim == 6)
         source_row[rolls, 3:] = address[rolls][:, None] + (4, 5)
     source_row[touching:, 0] = np.arange(limits.start, limits.stop)
-    H = take(rows, source_row.ravel())
+    H = submatrix(rows, source_row.ravel())
 
     def with_limits(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The values of all contacts; 0 for the limits."""

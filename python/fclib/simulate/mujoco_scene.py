@@ -63,7 +63,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
             f"{scene.name}: cannot ignore {', '.join(sorted(unknown))};"
             f" only {', '.join(sorted(IGNORABLE))}"
         )
-    with warnings_of() as said:
+    with warnings_of() as lines:
         m = compiled(scene)
     refuse_no_numbers(scene, m)
 
@@ -82,7 +82,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
         flag = IGNORABLE[feature]
         if flag is not None:
             m.opt.disableflags |= int(flag)
-    return m, tuple(dict.fromkeys(f"MuJoCo's compiler: {line}" for line in said))
+    return m, tuple(dict.fromkeys(f"MuJoCo's compiler: {line}" for line in lines))
 
 
 def compiled(scene: Scene) -> Any:
@@ -112,11 +112,11 @@ def compiled(scene: Scene) -> Any:
 @contextmanager
 def warnings_of() -> Iterator[list[str]]:
     """MuJoCo's warnings inside the block, one line each."""
-    said: list[str] = []
+    lines: list[str] = []
     usual = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: said.append(" ".join(text.split())))
+    mujoco.set_mju_user_warning(lambda text: lines.append(" ".join(text.split())))
     try:
-        yield said
+        yield lines
     finally:
         mujoco.set_mju_user_warning(usual)
 
@@ -337,7 +337,7 @@ class Gait:
     values: Vector  # (k x nu) controls
 
     @classmethod
-    def of(cls, scene: Scene, m: Any) -> Gait | None:
+    def of_scene(cls, scene: Scene, m: Any) -> Gait | None:
         """The gait of a model; None if it has none. ValueError if it is not a cycle."""
         keys = [m.key(i) for i in range(m.nkey) if m.key(i).name.startswith("gait")]
         if not keys:

@@ -29,7 +29,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fclib import _core, _solve
-from fclib.simulate.arrays import take, transposed_times
+from fclib.simulate.arrays import submatrix, transposed_times
 from fclib.simulate.moreau_jean import MoreauJean, System, Vector, components
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.simulation import Model
@@ -106,7 +106,7 @@ def step(
     highest -= CLOSED * bound
     kept = np.flatnonzero(bodies & touch & (highest > lowest))
 
-    sides = [take(system.H, columns.ravel()), take(system.H, columns[kept].ravel())]
+    sides = [submatrix(system.H, columns.ravel()), submatrix(system.H, columns[kept].ravel())]
     sides[1] = sides[1] @ sp.diags_array(np.tile([-1.0, *[1.0] * (d - 1)], len(kept)))
     w = np.zeros((len(contacts) + len(kept), d))
     w[:, 0] = np.concatenate((gap - lowest, (highest - gap)[kept]))

@@ -46,7 +46,7 @@
 
   // ---- classes, and what is open
   Fclib.pages.classes = async (page) => {
-    const s = site(), list = s.standings || [];
+    const s = site(), list = s.ratings || [];
     page.append(h("h1", {}, "Easy, hard and open"), h("p", {}, "A problem is easy if more than half of the solvers that take it solve it, and hard if fewer do. It is open if no solver has solved it, and nobody else's solution is within the tolerance."));
     if (!list.length) page.append(h("p", {}, "No stored runs came with this report: they are in the package fclib-collection."));
     for (const one of list) {

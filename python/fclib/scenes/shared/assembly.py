@@ -49,7 +49,7 @@ def exponentials(x: Vector) -> Vector:
 
 
 def as_published(name: str, exact: Vector) -> Vector:
-    """The same numbers, with the published last digit if that was another one: by their name."""
+    """The same numbers; some get the last digit that was published under this name."""
     found = exact.copy()
     for side, places in _last_digits().get(name, {}).items():
         found[places] = np.nextafter(exact[places], -np.inf if side == "below" else np.inf)

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
+from fclib.scenes.shared import siconos_input
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
 
@@ -35,7 +36,7 @@ class Scene:
 
     name: str
     xml: str = ""  # MJCF text, or
-    solids: Solids | None = None  # elastic blocks
+    solids: Solids | None = None  # elastic blocks; neither: another engine made the states
     time_step: float | None = None  # h [s]; None: the one of the MJCF file
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
@@ -111,8 +112,9 @@ class Scene:
         activation: float = 0.0,
         floating: bool = False,
         ground: float | None = None,
+        friction: float | None = None,
     ) -> Scene:
-        """The scene of an MJCF file, or of a URDF file. OSError if it cannot be read.
+        """The scene of an MJCF file, a URDF file or an input.dat of Siconos.
 
         Its parameters hold the SHA-256 of the file and of all files to which it refers.
 
@@ -129,13 +131,19 @@ class Scene:
             activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
             floating: whether the root of a URDF file moves freely; else it is welded to the world.
             ground: coefficient of friction of a plane below all at the start; None: no plane.
+            friction: that of all bodies of an input.dat, which does not have it, nor a time step.
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: a package is not known, or nothing can float.
+            ValueError: a package is not known, or nothing can float; or an input.dat is wrong, or
+                lacks its time step or friction.
             ImportError: it refers to files, and MuJoCo is missing.
         """
         path = Path(path)
+        if path.suffix == siconos_input.SUFFIX:
+            return cls._of_siconos(path, time_step, friction, restitution, law, activation)
+        if friction is not None:
+            raise ValueError(f"{path.name} has its own friction; friction= is for an input.dat")
         xml = path.read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
         resolved = resolve_packages(path.name, xml, packages or {})
@@ -164,6 +172,50 @@ class Scene:
             path=path if resolved == xml else None,
             includes=includes,
         )
+
+    @classmethod
+    def _of_siconos(
+        cls,
+        path: Path,
+        time_step: float | None,
+        friction: float | None,
+        restitution: float,
+        law: Law,
+        activation: float,
+    ) -> Scene:
+        """The scene of an input.dat."""
+        for value, name in ((time_step, "time step"), (friction, "friction")):
+            if value is None:
+                raise ValueError(f"{path}: does not have the {name}, which must be given")
+        assert time_step is not None
+        assert friction is not None
+        xml = siconos_input.mjcf_of(path, friction, time_step, siconos_input.GRAVITY)
+        folder = path.resolve().parent
+        files = {
+            os.path.relpath(file.resolve(), folder): digest_of(file)
+            for file in siconos_input.files_of(path)
+        }
+        return cls(
+            name=folder.name,
+            xml=xml,
+            time_step=time_step,
+            restitution=restitution,
+            law=law,
+            activation=activation,
+            parameters={
+                "file": path.name,
+                "sha256": digest_of(path),
+                "files": files,
+                "friction": friction,
+            },
+            title=folder.name,
+            description=f"Problems of the scene {folder.name}/{path.name} of Siconos.",
+        )
+
+
+def digest_of(path: Path) -> str:
+    """The SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]:

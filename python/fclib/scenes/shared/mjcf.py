@@ -74,9 +74,9 @@ def document(
     (n); rest: further elements, as equality constraints. MuJoCo takes for a contact the larger
     friction of its two geometries.
 
-    multiccd: several points where faces of meshes or of cylinders meet. Near contact, MuJoCo 4.0.0
-    then gives false distances for cylinders and capsules with each other, with boxes and with
-    meshes; a scene with such pairs must do without.
+    multiccd: if faces of meshes or of cylinders meet, there are several points. Near contact,
+    MuJoCo 4.0.0 then gives false distances for cylinders and capsules with each other, with boxes
+    and with meshes. A scene with such pairs must switch it off.
     """
     elements = list(rest)
     if not multiccd:

@@ -90,8 +90,9 @@ class Bed:
 class Solids:
     """Blocks in contact with each other, and with a rigid floor z = 0, if there is one.
 
-    Of two blocks the later one's nodes are held against the earlier one's faces: put the lower
-    first. Faces touch that look at each other, and are no further apart than `reach` at the start.
+    The nodes of a block are kept outside the faces of the blocks before it in the list, so the
+    lower block comes first. Two faces can touch if they look at each other and are no further apart
+    than `reach` at the start.
 
     Instead of blocks there may be meshes.
     """

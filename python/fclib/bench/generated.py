@@ -30,7 +30,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fclib"
 
 
-def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
+def files_of(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
     """The files of a recipe; make(folder) writes them if they are not there yet."""
     text = json.dumps({"fclib": _core.version, **recipe}, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -62,9 +62,12 @@ def simulated(
         ImportError: MuJoCo is not there.
         fclib.OptionError: there is no such family, or it refuses the parameters.
     """
+    from fclib import scenes
+
     wanted = set(steps)
     recipe = {
         "scene": family,
+        **scenes.identity_of(family),
         "parameters": dict(parameters),
         "steps": sorted(wanted),
         "seed": seed,
@@ -72,7 +75,7 @@ def simulated(
     }
 
     def make(folder: Path) -> None:
-        from fclib import scenes, simulate
+        from fclib import simulate
 
         try:
             kind = scenes.get(family)
@@ -92,7 +95,7 @@ def simulated(
                 )
                 _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
 
-    return made(recipe, make)
+    return files_of(recipe, make)
 
 
 def stored(name: str, form: str | None, start: int, count: int | None, stride: int) -> list[Path]:
@@ -143,7 +146,7 @@ def stored(name: str, form: str | None, start: int, count: int | None, stride: i
             own = f"{plan.scene.name}-{int(states.number[place]):05d}.hdf5"
             _core.write(folder / own, problem)
 
-    return made(recipe, make)
+    return files_of(recipe, make)
 
 
 def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
@@ -159,7 +162,7 @@ def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
             problem = plant(contacts, spacedim, seed + number)
             _core.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
 
-    return made(recipe, make)
+    return files_of(recipe, make)
 
 
 def plant(nc: int, d: int, seed: int) -> _core.LocalProblem:

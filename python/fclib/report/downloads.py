@@ -19,7 +19,7 @@ CHUNK = 100  # number of problems in one data file
 FORMS = ("global", "local")
 
 
-class Taking:
+class Downloads:
     """The files of a site: copies, links to a published address, or none."""
 
     def __init__(self, site: Path, source: Path | None, with_files: bool, address: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 
-class Same:
+class EqualByEntries:
     """A dataclass whose fields may be arrays: equal if these are, entry by entry."""
 
     def __eq__(self, other: object) -> bool:

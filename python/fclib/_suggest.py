@@ -15,7 +15,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return ", ".join(names[one] for one in close)
 
 
-def meant(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, known: Iterable[str]) -> str:
     """A question with the nearest of the known names, to put before a list; "" if none is near.
 
     Upper and lower case are equal.

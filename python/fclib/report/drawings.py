@@ -48,7 +48,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Drawing:
     """The result of drawing a problem."""
 
     place: int
@@ -76,7 +76,7 @@ def put(folder: Path, name: str, value: Any) -> int:
     return len(text)
 
 
-def draw(folder: Path, task: Task) -> Drawn:
+def draw(folder: Path, task: Task) -> Drawing:
     """Draw a problem into a site's folder; nothing if its file cannot be read."""
     try:
         problem: Any = _core.read(task.file)
@@ -85,14 +85,14 @@ def draw(folder: Path, task: Task) -> Drawn:
         )
         record = view_of(problem, solution) if task.view or task.picture else None
     except _core.Error:
-        return Drawn(task.place)  # the file is gone or damaged; its runs stay
+        return Drawing(task.place)  # the file is gone or damaged; its runs stay
     size = put(folder, f"views/{task.place}", record) if record is not None and task.view else 0
     bodies, contacts = problem.bodies, problem.contacts
     thumb = folder / "thumbs" / f"{task.place}.webp"
     thumb.parent.mkdir(exist_ok=True)
     if bodies is None or contacts is None or not len(bodies.shape_kind):
         picture.draw_matrix(matrix_of(problem), thumb)
-        return Drawn(task.place, task.view, thumb=True, bytes=size + thumb.stat().st_size)
+        return Drawing(task.place, task.view, thumb=True, bytes=size + thumb.stat().st_size)
     solids = solids_of(bodies, contacts)
     picture.draw(solids, thumb, near=contacts.point[(contacts.shape >= 0).all(axis=1)])
     if task.picture is not None and record is not None:
@@ -108,7 +108,7 @@ def draw(folder: Path, task: Task) -> Drawn:
         )
     moving = np.flatnonzero(solids.moves[solids.body] == 1)
     poses = np.hstack([solids.place, solids.turn])[moving]
-    return Drawn(
+    return Drawing(
         task.place,
         task.view,
         thumb=True,
@@ -137,9 +137,9 @@ def scene_of(solids: Solids) -> str:
     return digest.hexdigest()[:16]
 
 
-def draw_all(folder: Path, tasks: Sequence[Task], jobs: int | None = None) -> Iterator[Drawn]:
+def draw_all(folder: Path, tasks: Sequence[Task], jobs: int | None = None) -> Iterator[Drawing]:
     """Draw problems, in order; in several processes if there are many."""
-    work: Callable[[Task], Drawn] = partial(draw, folder)
+    work: Callable[[Task], Drawing] = partial(draw, folder)
     jobs = jobs or len(os.sched_getaffinity(0))
     if jobs == 1 or len(tasks) < MANY:
         yield from map(work, tasks)
@@ -149,7 +149,7 @@ def draw_all(folder: Path, tasks: Sequence[Task], jobs: int | None = None) -> It
 
 
 def sequences(
-    folder: Path, drawn: Sequence[Drawn], rows: Sequence[dict[str, Any]]
+    folder: Path, drawn: Sequence[Drawing], rows: Sequence[dict[str, Any]]
 ) -> tuple[dict[tuple[str, str], list[int]], int]:
     """Write the steps of each family of one scene. Return their numbers and the bytes.
 
@@ -158,7 +158,7 @@ def sequences(
         drawn: the problems.
         rows: the catalogue.
     """
-    groups: dict[tuple[str, str, str], list[Drawn]] = defaultdict(list)
+    groups: dict[tuple[str, str, str], list[Drawing]] = defaultdict(list)
     for one in drawn:
         row = rows[one.place]
         if one.poses is not None and len(one.poses) and row.get("number") is not None:

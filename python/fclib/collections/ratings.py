@@ -36,7 +36,7 @@ import numpy as np
 
 from fclib import _core, _digest, scenes
 from fclib._verdicts import UNSUITABLE, is_solved, rating
-from fclib.collections import catalog, known, published, trajectory
+from fclib.collections import catalog, published, set_index, trajectory
 
 TOLERANCE: Final = 1e-8
 DIGITS: Final = 16  # digits of a digest that are stored
@@ -46,7 +46,7 @@ FOLDER: Final = "results"
 FIRST: Final = "standard"  # the set of most runs
 
 
-class StandingError(ValueError):
+class RatingError(ValueError):
     """A solution is refused, with the reason; or results cannot be stored."""
 
 
@@ -71,13 +71,13 @@ class Run:
         return is_solved(self.status)
 
     @property
-    def settled(self) -> bool:
+    def shows_a_solution(self) -> bool:
         """Whether it is solved, or found too late or elsewhere with an error within TOLERANCE."""
         return self.solved or (self.error is not None and self.error <= TOLERANCE)
 
 
 @dataclass(frozen=True)
-class Standing:
+class RatedProblem:
     """A problem, and the known facts of its difficulty."""
 
     id: str
@@ -113,17 +113,15 @@ class Basis:
 
 
 def folder() -> Path:
-    """The folder of results. StandingError if the package of trajectories is missing."""
+    """The folder of results. RatingError if the package of trajectories is missing."""
     root = published.root()
     if root is None:
-        raise StandingError(
-            "no results are stored here: they come with the package fclib-collection"
-        )
+        raise RatingError("no results are stored here: they come with the package fclib-collection")
     return root.parent / FOLDER
 
 
 def runs() -> tuple[Run, ...]:
-    """All stored runs. Raises StandingError, OSError."""
+    """All stored runs. Raises RatingError, OSError."""
     path = folder() / "runs.csv"
     return _read(path, path.stat().st_mtime_ns) if path.is_file() else ()
 
@@ -141,7 +139,7 @@ NUMBERS: Final = ("limit", "error", "cpu")
 
 
 def write(rows: Iterable[Run]) -> Path:
-    """Store all runs, in order; the file is whole, or the old one. StandingError, OSError."""
+    """Store all runs, in order; the file is whole, or the old one. RatingError, OSError."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(Run)])
@@ -204,9 +202,9 @@ def members(name: str) -> dict[str, str]:
     They come from a list, from stored states, or from problems that are assembled here, in seconds.
     A family that must be simulated has none.
     """
-    found = {f"{name}/{c.family}/{c.number:04d}": c.digest for c in known.choices(name)}
+    found = {f"{name}/{c.family}/{c.number:04d}": c.digest for c in set_index.choices(name)}
     listed = {own.rpartition("/")[0] for own in found}
-    for own in known.folders([name]):
+    for own in set_index.folders([name]):
         if own not in listed:
             found |= {f"{own}/{number:04d}": digest for number, digest in digests(own).items()}
     return found
@@ -214,8 +212,8 @@ def members(name: str) -> dict[str, str]:
 
 def digests(own: str) -> dict[int, str]:
     """The digests of the problems of SET/FAMILY, by their numbers."""
-    stored = published.digests(own, known.version_of(own))
-    scene = None if stored else known.plan_of(own).scene
+    stored = published.digests(own, set_index.version_of(own))
+    scene = None if stored else set_index.plan_of(own).scene
     if not isinstance(scene, scenes.Assembled):
         return stored
     if hasattr(scene.family, "digests"):
@@ -223,12 +221,12 @@ def digests(own: str) -> dict[int, str]:
     return {n: _digest.digest(scene.problem(n)) for n in range(scene.family.problems)}
 
 
-def standings(name: str) -> tuple[list[Standing], Basis | None]:
+def ratings_of(name: str) -> tuple[list[RatedProblem], Basis | None]:
     """The class of each problem of a set, and its basis; None if nothing was run.
 
     Raises:
         KeyError: there is no such set.
-        StandingError, OSError: results cannot be read.
+        RatingError, OSError: results cannot be read.
     """
     stored: dict[str, list[Run]] = defaultdict(list)
     for run in runs():
@@ -249,7 +247,7 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
         # an accepted solution has no limit and no vote
         voters = [run for run in last.values() if run.limit and run.status != UNSUITABLE]
         voting += voters
-        rows.append(standing(name_, digest, mine, voters))
+        rows.append(rating_of(name_, digest, mine, voters))
     if not voting:
         return rows, None
     dates = sorted(run.date for run in voting)
@@ -266,8 +264,8 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
 def classes(name: str) -> Mapping[str, str]:
     """The class of each problem of a set that was run, by its digest; empty for other sets."""
     try:
-        return {row.digest: row.rating for row in standings(name)[0] if row.rating}
-    except (KeyError, StandingError):
+        return {row.digest: row.rating for row in ratings_of(name)[0] if row.rating}
+    except (KeyError, RatingError):
         return {}
 
 
@@ -276,17 +274,17 @@ def when(run: Run) -> str:
     return run.date
 
 
-def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]) -> Standing:
-    """The standing of one problem."""
+def rating_of(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]) -> RatedProblem:
+    """The class of one problem, and its facts."""
     solved = sum(run.solved for run in voters)
     judged = [run for run in mine if run.error is not None]
     best = min(judged, key=lambda run: run.error or 0.0, default=None)
     found = rating(solved, len(voters))
-    if found == "open" and any(run.settled for run in mine):
+    if found == "open" and any(run.shows_a_solution for run in mine):
         found = "hard"  # solved at another limit, or by somebody else
     path = solution_path(digest)
     limit = voters[0].limit if voters else None
-    return Standing(
+    return RatedProblem(
         name, digest, found, solved, len(voters), limit, best, path if path.is_file() else None
     )
 
@@ -302,23 +300,23 @@ def solution_path(digest: str) -> Path:
 def problem_of(name: str) -> Any:
     """The problem SET/FAMILY/NUMBER of a set with stored states, or assembled directly."""
     own, _, number = name.rpartition("/")
-    plan = known.plan_of(own)
+    plan = set_index.plan_of(own)
     if isinstance(plan.scene, scenes.Assembled):
         return plan.scene.problem(int(number))
     if plan.trajectory is None:
-        raise StandingError(f"{own}: its states are not stored")
+        raise RatingError(f"{own}: its states are not stored")
     states = trajectory.read(plan.trajectory)
     return states.problem(states.index(int(number))).problem
 
 
 def known_solution(name: str) -> tuple[Any, _core.Solution, dict[str, Any]]:
-    """An open problem, the best solution known, and its finder. StandingError if there is none."""
+    """An open problem, the best solution known, and its finder. RatingError if there is none."""
     digest = members(name.split("/")[0]).get(name)
     if digest is None:
-        raise StandingError(f"{name}: there is no such problem")
+        raise RatingError(f"{name}: there is no such problem")
     stored = stored_solution(digest)
     if stored is None:
-        raise StandingError(f"{name}: no solution of it is stored")
+        raise RatingError(f"{name}: no solution of it is stored")
     return problem_of(name), *stored
 
 
@@ -327,9 +325,9 @@ def stored_solution(digest: str) -> tuple[_core.Solution, dict[str, Any]] | None
     if published.root() is None or not (path := solution_path(digest)).is_file():
         return None
     with np.load(path) as arrays:
-        said: dict[str, Any] = json.loads(str(arrays["origin"]))
+        finder: dict[str, Any] = json.loads(str(arrays["origin"]))
         multipliers = arrays["l"] if "l" in arrays.files else None
-        return solution_of(arrays["r"], multipliers), said
+        return solution_of(arrays["r"], multipliers), finder
 
 
 def solution_of(r: Any, multipliers: Any) -> _core.Solution:
@@ -337,7 +335,7 @@ def solution_of(r: Any, multipliers: Any) -> _core.Solution:
     return _core.Solution(r=r) if multipliers is None else _core.Solution(r=r, l=multipliers)
 
 
-def take(path: Path, by: str, name: str | None = None) -> tuple[str, float, float]:
+def accept_solution(path: Path, by: str, name: str | None = None) -> tuple[str, float, float]:
     """Verify the solution of an open problem that a file holds, and keep it if it is better.
 
     It is judged on the collection's own problem, assembled from its state. Of the file's problem
@@ -352,29 +350,29 @@ def take(path: Path, by: str, name: str | None = None) -> tuple[str, float, floa
         The name, the error, and the best error known before.
 
     Raises:
-        StandingError: the problem is not open, or the solution is not better.
+        RatingError: the problem is not open, or the solution is not better.
         fclib.Error, OSError: the file cannot be read, or the results not written.
     """
     problem, solution = _core.read(path), _core.read_solution(path)
     if solution is None:
-        raise StandingError(f"{path}: holds no solution")
+        raise RatingError(f"{path}: holds no solution")
     name = name or recognised(path, problem)
-    rated = {row.id: row for row in standings(name.split("/")[0])[0]}
+    rated = {row.id: row for row in ratings_of(name.split("/")[0])[0]}
     if name not in rated:
-        raise StandingError(f"{name}: there is no such problem")
+        raise RatingError(f"{name}: there is no such problem")
     row = rated[name]
     if row.rating != "open":
         words = f"is {row.rating}" if row.rating else "was not run"
-        raise StandingError(f"{name}: {words}, and solutions are taken of open problems")
+        raise RatingError(f"{name}: {words}, and solutions are taken of open problems")
     own = problem_of(name)
     if solution.r.size != own.spacedim * own.nc:
-        raise StandingError(
+        raise RatingError(
             f"{path}: r has {solution.r.size} entries, and {name} has {own.spacedim * own.nc}"
         )
     error = float(_core.merit(own, solution_of(solution.r, solution.l)).error)
     best = row.best.error if row.best is not None and row.best.error is not None else np.inf
     if not error < BETTER * best:
-        raise StandingError(
+        raise RatingError(
             f"{name}: the error of this solution is {error:.3g}, and {best:.3g} is known"
             + (f" by {row.best.solver}" if row.best is not None else "")
         )
@@ -387,28 +385,28 @@ def take(path: Path, by: str, name: str | None = None) -> tuple[str, float, floa
 
 
 def store_solution(
-    problem: Any, digest: str, solution: _core.Solution, said: Mapping[str, Any]
+    problem: Any, digest: str, solution: _core.Solution, finder: Mapping[str, Any]
 ) -> None:
     """Write r and l of the best solution of a problem."""
     arrays: dict[str, Any] = {"r": solution.r} | ({"l": solution.l} if problem.p else {})
     content = io.BytesIO()
-    np.savez_compressed(content, origin=json.dumps(dict(said), sort_keys=True), **arrays)
+    np.savez_compressed(content, origin=json.dumps(dict(finder), sort_keys=True), **arrays)
     path = solution_path(digest)
     path.parent.mkdir(parents=True, exist_ok=True)
     catalog.replace_file(path, lambda beside: beside.write_bytes(content.getvalue()))
 
 
 def recognised(path: Path, problem: Any) -> str:
-    """The name of a file's problem in a list, by its digest. StandingError if it has none."""
+    """The name of a file's problem in a list, by its digest. RatingError if it has none."""
     own = _digest.digest(problem)
-    lists = [name for name in known.sets() if known.choices(name)]
+    lists = [name for name in set_index.sets() if set_index.choices(name)]
     # first the set for which classes are made
     for name in sorted(lists, key=lambda name: name != FIRST):
-        rows, _ = standings(name)
+        rows, _ = ratings_of(name)
         for row in rows:
             if row.digest == own or (row.rating == "open" and condenses_to(row.id, problem, own)):
                 return row.id
-    raise StandingError(
+    raise RatingError(
         f"{path}: its problem is none of {', '.join(lists)}; name it, if it differs from one by the"
         " rounding of another machine"
     )

@@ -3,7 +3,7 @@
 import pytest
 
 from fclib import collections, scenes
-from fclib._meant import meant
+from fclib._suggest import suggestion
 
 
 @pytest.mark.parametrize(
@@ -12,7 +12,7 @@ from fclib._meant import meant
 )
 def test_the_nearest_name(name: str, nearest: str | None) -> None:
     known = ["Chain", "Chute", "standard"]
-    assert meant(name, known) == (f"did you mean {nearest}? " if nearest else "")
+    assert suggestion(name, known) == (f"did you mean {nearest}? " if nearest else "")
 
 
 def test_sets_and_families_are_looked_for_together() -> None:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes
-from fclib._meant import meant
+from fclib._suggest import suggestion
 from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, evenly, families, source
 
@@ -29,7 +29,7 @@ DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
 SHIPPED = ("tiny",)  # sets whose problems need no build
 
 # name, version, description; a set that a family names and that is missing here has version 1
-KNOWN: dict[str, tuple[str, str]] = {
+SETS: dict[str, tuple[str, str]] = {
     "rt444": ("5", "the four families of RT-0444"),
     "granular": ("7", "grains that fall, flow and are pressed"),
     "rolling": ("6", "grains with rolling friction"),
@@ -102,7 +102,7 @@ def kind_of(folder: str) -> str:
 
 def version(name: str) -> str:
     """The present version of a set."""
-    return KNOWN[name][0] if name in KNOWN else "1"
+    return SETS[name][0] if name in SETS else "1"
 
 
 def version_of(folder: str) -> str:
@@ -183,7 +183,7 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
     every = {folder for own in known.values() for folder in own}
     found: dict[str, None] = {}
     for name in names:
-        older = version is not None and version != KNOWN.get(name, ("", ""))[0]
+        older = version is not None and version != SETS.get(name, ("", ""))[0]
         if version is not None and name in known and older and choices(name):
             had = [f"{name}/{choice.family}" for choice in listed(name, version)]
             stored = [own for own in published.folders(name) if version in published.versions(own)]
@@ -199,12 +199,13 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
             has = [folder.partition("/")[2] for folder in known[own]]
             family = name.partition("/")[2]
             raise KeyError(
-                f"the set {own} has no family {family!r}; {meant(family, has)}"
+                f"the set {own} has no family {family!r}; {suggestion(family, has)}"
                 f"it has {', '.join(has)}"
             )
         else:
             raise KeyError(
-                f"no set and no family is called {name!r}; {meant(name, [*known, *families()])}"
+                f"no set and no family is called {name!r}; "
+                f"{suggestion(name, [*known, *families()])}"
                 f"sets: {', '.join(known)}; families: {', '.join(families())}"
             )
     return list(found)
@@ -346,6 +347,7 @@ def published_digest(row: Mapping[str, Any]) -> str | None:
     family = families().get(row["family"])
     if (
         family is not None
+        and row["family"] in scenes.own()
         and hasattr(family, "digests")
         and (row["collection"], row["version"]) == (family.collection, version(family.collection))
     ):

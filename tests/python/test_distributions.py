@@ -1,0 +1,111 @@
+"""The published files beside a built collection, and the figures of RT-0444, by one command."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fclib
+from fclib import collections
+from fclib.collections.plan import Plan
+from workshop.sets import published_distributions as script
+
+pytest.importorskip("pyarrow")
+PUBLISHED = "Local/siconos/BoxesStack"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five problems under the name of a published set."""
+    out = tmp_path_factory.mktemp("built")
+    family: Any = fclib.scenes.get("BoxesStack")
+    pytest.importorskip("mujoco")
+    scene = family(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=0)
+    plan = Plan(scene=scene, collection="rt444", problems=5, references=False)
+    collections.build([plan], out, pictures=False)
+    return out
+
+
+def listed(path: Path, rows: list[tuple[str, object, object, object]]) -> Path:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["set", "file", "nsgs_sweeps", "dof", "contacts", "bytes"])
+        for name, *known in rows:
+            writer.writerow([name, "x.hdf5", *known, 1])
+    return path
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
+    monkeypatch.setattr(sys, "argv", ["published_distributions.py", *map(str, arguments)])
+    script.main()
+
+
+def cells(text: str) -> list[list[str]]:
+    return [[cell.strip() for cell in row.split("|")[1:-1]] for row in text.splitlines()]
+
+
+def test_ours_stand_under_the_published_files(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("matplotlib")
+    files = listed(
+        tmp_path / "files.csv",
+        [(PUBLISHED, k, "", 4 * k) for k in range(1, 12)] + [("Local/other", 7, 6, "")],
+    )
+    run(monkeypatch, built, "--files", files, "--sample", 2, "--pictures", tmp_path / "out")
+    rows = cells(capsys.readouterr().out)
+    table = {(row[0], row[1]): row[2:] for row in rows[2:]}
+    # least, 10 %, a quarter, median, three quarters, 90 %, largest
+    theirs = ["11", "1", "2", "3", "6", "9", "10", "11"]
+    assert table[f"*{PUBLISHED}*", "sweeps"][0] == "11"
+    assert table[f"*{PUBLISHED}*", "sweeps"][1::3] == ["1", "6", "11"]
+    assert table[f"*{PUBLISHED}*", "contacts"][1::6] == ["4", "44"]
+    assert len(table[f"*{PUBLISHED}*", "sweeps"]) == len(theirs)
+    rows_of = collections.read_catalog(built).to_pylist()
+    contacts = sorted(row["nc"] for row in rows_of)
+    ours = table["rt444/BoxesStack", "contacts"]
+    assert (ours[0], ours[1], ours[-1]) == ("5", f"{contacts[0]}", f"{contacts[-1]}")
+    # the first and the last one were solved
+    first, last = (script.sweeps_of(built / rows_of[k]["local_file"], 10**5, 20) for k in (0, -1))
+    sweeps = table["rt444/BoxesStack", "sweeps"]
+    assert (sweeps[0], sweeps[1], sweeps[-1]) == ("2", f"{min(first, last)}", f"{max(first, last)}")
+    # the name of a file did not tell it, and nothing of ours is beside the other set
+    assert ("rt444/BoxesStack", "dof") not in table
+    assert [key for key in table if key[0] == "*Local/other*"] == [
+        ("*Local/other*", "dof"),
+        ("*Local/other*", "sweeps"),
+    ]
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == [
+        f"{PUBLISHED.replace('/', '-')}-{label}.png" for label in ("contacts", "sweeps")
+    ]
+
+
+def test_a_list_without_the_columns_is_named(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = tmp_path / "files.csv"
+    files.write_text("set,file,dof,contacts\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"files.csv: has no column nsgs_sweeps"):
+        run(monkeypatch, built, "--files", files)
+
+
+def test_figures_of_the_report_are_of_its_four_families(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    with pytest.raises(SystemExit, match="rt444/Chain: is not built"):
+        run(monkeypatch, built, "--report", tmp_path / "out")
+    folder, rows = script.families([built])["rt444/BoxesStack"]
+    ours = {f"rt444/{name}": (folder, rows) for name in script.REPORT}
+    script.report(ours, tmp_path / "all")
+    assert sorted(path.parent.name for path in (tmp_path / "all").rglob("*.svg")) == [
+        "figure-2",
+        "figure-3",
+        "figure-4",
+        "figure-5",
+    ]

@@ -1,0 +1,96 @@
+"""A script of Siconos: a scene of RT-0444, with Bullet.
+
+    /usr/bin/python3 workshop/sets/_siconos_rt444.py SCENE END [STEP.npz]
+
+rt444_states.py records its steps. It begins where the recorded STEP begins, or at the start of the
+scene, and ends at END [s].
+
+What a step is solved with is chosen here, as no problem depends on it: ADMM, from the reactions of
+the step before, and one iteration of Newton's a step. By at most 100 sweeps of nsgs to 1e-4 a step,
+which cost less, seven boxes of the stack lean, and fall.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import siconos.io.mechanics_run as mechanics_run
+import siconos.kernel as kernel
+import siconos.numerics as numerics
+from _rt444_scenes import SCENES, Body
+from siconos.mechanics.collision.tools import Contactor
+
+TOLERANCE = 1e-8
+MOST_ITERATIONS = 1000
+KINDS = {"box": "Box", "capsule": "Capsule"}
+
+
+def beginning(name: str, step: Path | None) -> tuple[list[Body], float]:
+    """The bodies of a scene, at its start or at that of a recorded step, and the time [s]."""
+    bodies = SCENES[name].bodies()
+    if step is None:
+        return bodies, 0.0
+    with np.load(step) as known:
+        start = float(known["end"]) - float(known["h"])
+        positions, velocities = known["positions"], known["velocities"]
+    # Siconos counts the bodies that move from 1
+    order = np.argsort(positions[:, 0])
+    states = iter(zip(positions[order, 1:], velocities[order, 1:], strict=True))
+    found = []
+    for body in bodies:
+        if body.mass:
+            pose, twist = (tuple(values.tolist()) for values in next(states))
+            body = replace(body, place=pose[:3], turn=pose[3:], velocity=twist)
+        found.append(body)
+    return found, start
+
+
+def make(file: str, bodies: list[Body], mu: float) -> None:
+    """Write the scene as Siconos' mechanics reads it."""
+    with mechanics_run.MechanicsHdf5Runner(mode="w", io_filename=file) as io:
+        for body in bodies:
+            shape = f"{body.kind} {' '.join(map(str, body.sizes))}"
+            io.add_primitive_shape(shape, KINDS[body.kind], body.sizes)
+            moving = {"mass": body.mass, "inertia": body.inertia} if body.mass else {}
+            io.add_object(
+                body.name,
+                [Contactor(shape)],
+                translation=list(body.place),
+                orientation=list(body.turn),
+                velocity=list(body.velocity),
+                **moving,
+            )
+        io.add_Newton_impact_friction_nsl("contact", mu=mu, e=0.0)
+
+
+def main() -> None:
+    name, end, *step = sys.argv[1:]
+    scene = SCENES[name]
+    bodies, start = beginning(name, Path(step[0]) if step else None)
+    options = kernel.solver_options_create(numerics.SICONOS_FRICTION_3D_ADMM)
+    options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = MOST_ITERATIONS
+    options.dparam[numerics.SICONOS_DPARAM_TOL] = TOLERANCE
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "scene.hdf5")
+        make(file, bodies, scene.mu)
+        with mechanics_run.MechanicsHdf5Runner(mode="r+", io_filename=file) as io:
+            io.run(
+                t0=start,
+                T=float(end),
+                h=scene.step,
+                theta=scene.theta,
+                Newton_options=kernel.SICONOS_TS_LINEAR,
+                Newton_max_iter=1,
+                solver_options=options,
+                verbose=False,
+                verbose_progress=False,
+                output_frequency=round(scene.end / scene.step) + 1,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,418 @@
+"""The stored states of rt444: the authors' scenes in Siconos, and which of their steps are kept.
+
+    .venv/bin/python -m workshop.sets.rt444_states simulate BoxesStack --states DIR [--every 4]
+    .venv/bin/python -m workshop.sets.rt444_states judge BoxesStack --states DIR
+    .venv/bin/python -m workshop.sets.rt444_states choose BoxesStack --states DIR --out TR
+    .venv/bin/python -m workshop.sets.rt444_states status --states DIR
+
+`_rt444_scenes.py` has the scenes. Each command can be killed, and goes on where it was.
+
+simulate    Siconos with Bullet, by fclib's recorder: each EVERY-th step as a file of DIR/SCENE
+judge       DIR/SCENE/sweeps.csv: the sweeps of our nsgs to 1e-8 on each of them, up to MOST
+choose      the steps on which nsgs takes more than LEAST sweeps, as the authors' rule is: as many
+            as the report has, evenly spread from a place that the seed draws, no two of them
+            nearly equal (the same contacts, and W within NEAR of its largest entry)
+
+A step whose poses, velocities and contacts do not give Siconos' own W is left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import fclib
+from fclib import _digest
+from fclib._geometry import rotations
+from fclib.collections import handed, trajectory
+from fclib.external import siconos
+from fclib.recorders import _siconos
+from fclib.scenes import Scene as Described
+from fclib.simulate.rounding import exponent_of
+from workshop.sets._rt444_scenes import SCENES, Body, Scene
+
+RUN: Final = "run-"  # the folders of the steps that one command recorded
+SCRIPT: Final = Path(__file__).with_name("_siconos_rt444.py")
+PROBLEMS: Final = {"BoxesStack": 1514, "Capsules": 1705, "KaplasTower": 201}  # of the report
+LEAST: Final = 80  # sweeps: a step that takes more is kept
+TOLERANCE: Final = 1e-8
+MOST: Final = 200_000  # sweeps of the judgement
+NEAR: Final = 1e-6
+SEED: Final = 0
+GRAVITY: Final = 9.80665  # [m/s^2] Siconos' own
+# W that follows from the states, before they are rounded, against Siconos' own: the normal
+# components, relative to the largest entry
+EXACT: Final = 1e-9
+AUTHORS: Final = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
+CHOSEN: Final = (
+    "inertias of homogeneous bodies; boxes as Bullet's primitives; each step by one iteration of"
+    " Newton's and Siconos' ADMM to 1e-8, at most 1000 iterations, from the reactions of the step"
+    " before; tangents"
+)
+# as the families here call them
+SIZES: Final[dict[str, dict[str, Any]]] = {
+    "BoxesStack": {"boxes": 50, "size": 2.0},
+    "KaplasTower": {
+        **{"levels": 11, "planks": 12, "length": 11.74, "width": 2.348, "thickness": 0.78267}
+    },
+    "Capsules": {"capsules": 100, "length": 5.0, "radius": 1.0},
+}
+WORDS: Final = {
+    "BoxesStack": (
+        "Stack of boxes",
+        "50 cubes that start above each other and drop one upon another, under gravity.",
+        "multibody systems, masonry",
+    ),
+    "KaplasTower": (
+        "Tower of kaplas",
+        "Rings of wooden planks on edge that drop one upon another, under gravity.",
+        "masonry, multibody systems",
+    ),
+    "Capsules": (
+        "Capsules in a box",
+        "Capsules that start above each other and drop into an open box, under gravity.",
+        "granular matter",
+    ),
+}
+
+
+# ---- simulation
+
+
+def simulate(name: str, folder: Path, every: int, end: float) -> None:
+    """Go on from the last recorded step, up to the end [s]."""
+    if word := siconos.missing():
+        sys.exit(word)
+    before = files(folder)
+    runs = [int(path.name.removeprefix(RUN)) for path in folder.glob(f"{RUN}*")]
+    run = folder / f"{RUN}{max(runs, default=-1) + 1}"
+    run.mkdir(parents=True)
+    start = [str(before[max(before)].resolve())] if before else []
+    command = [siconos.python(), str(_siconos.STEPS), str(run), str(every), str(SCRIPT)]
+    # so that Siconos ends with this command
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    status = subprocess.run(
+        [*command, name, str(end), *start],
+        check=False,
+        stdout=subprocess.DEVNULL,
+        env=os.environ | dict.fromkeys(siconos.THREADS, "1"),
+    ).returncode
+    if status:
+        sys.exit(f"{name}: Siconos ended with status {status}; the same command goes on")
+
+
+def files(folder: Path) -> dict[int, Path]:
+    """The recorded steps by their numbers; of a step that was simulated twice the last."""
+    found: dict[int, Path] = {}
+    for run in sorted(folder.glob(f"{RUN}*"), key=lambda path: int(path.name.removeprefix(RUN))):
+        paths = sorted(run.glob("*.npz"))
+        if paths and not whole(paths[-1]):  # a kill interrupted it
+            paths.pop()
+        if not paths:
+            continue
+        step = _siconos.told(paths[0])
+        # files count the steps of their run
+        before = round(step.start / step.h) - int(paths[0].stem)
+        own = {before + int(path.stem): path for path in paths}
+        # what was simulated after the state from which this run went on
+        found = {number: path for number, path in found.items() if number < min(own)} | own
+    return found
+
+
+def whole(path: Path) -> bool:
+    try:
+        _siconos.told(path)
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile):
+        return False
+    return True
+
+
+# ---- problems
+
+
+@dataclass(frozen=True)
+class State:
+    """A recorded step, with its contacts by numbers of solids."""
+
+    number: int  # step of the simulation
+    told: Any
+    body: Any
+
+    @classmethod
+    def read(cls, number: int, path: Path, bodies: list[Body]) -> State:
+        told = _siconos.told(path)
+        free = np.array([i for i, body in enumerate(bodies) if body.mass])
+        fixed = [i for i, body in enumerate(bodies) if not body.mass]
+        own = np.where(told.body < 0, -1, free[told.body])
+        for c in np.flatnonzero(own[:, 0] < 0):
+            away = [distance(bodies[i], told.point[c]) for i in fixed]
+            own[c, 0] = fixed[int(np.argmin(away))]
+        return cls(number, told, own)
+
+
+def distance(body: Body, point: Any) -> float:
+    """How far a point is from a fixed box."""
+    turn = rotations(np.array([body.turn]))[0]
+    beyond = np.abs(turn.T @ (point - np.array(body.place))) - np.array(body.sizes) / 2
+    return float(np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0.0))
+
+
+def solid(body: Body) -> handed.Solid:
+    """A body as it is stored."""
+    along_y = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)  # from z
+    size = tuple(0.5 * edge for edge in body.sizes)
+    if body.kind == "capsule":
+        size = (body.sizes[0], 0.5 * body.sizes[1])
+    return handed.Solid(
+        name=body.name,
+        kind=body.kind,
+        size=size,
+        mass=body.mass,
+        inertia=body.inertia if body.mass else (0.0, 0.0, 0.0),
+        place=body.place,
+        turn=body.turn,
+        **({"shape_turn": along_y} if body.kind == "capsule" else {}),
+    )
+
+
+def stored(states: list[State], scene: Scene, exponent: int | None) -> Any:
+    """Poses, velocities and contacts of states, rounded if there is an exponent."""
+
+    def rounded(values: Any) -> Any:
+        return values if exponent is None else trajectory.rounded(values, exponent)
+
+    contacts = handed.Handed(
+        solids=tuple(solid(body) for body in scene.bodies()),
+        mu=scene.mu,
+        theta=scene.theta,
+        gravity=GRAVITY,
+        count=np.array([len(state.body) for state in states]),
+        body=np.concatenate([state.body for state in states]),
+        feature=np.concatenate([state.told.feature for state in states]),
+        point=rounded(np.concatenate([state.told.point for state in states])),
+        normal=rounded(np.concatenate([state.told.normal for state in states])),
+        gap=rounded(np.concatenate([state.told.gap for state in states])),
+    )
+    position = rounded(np.stack([state.told.position.ravel() for state in states]))
+    velocity = rounded(np.stack([state.told.velocity.ravel() for state in states]))
+    return position, velocity, contacts
+
+
+def problem_of(state: State, scene: Scene, exponent: int | None = None) -> Any:
+    """The problem of a step."""
+    position, velocity, contacts = stored([state], scene, exponent)
+    info = fclib.ProblemInfo()
+    return contacts.problem(0, position[0], velocity[0], scene.step, info)
+
+
+def exponent_for(scene: Scene) -> int:
+    """The quantum of the stored states."""
+    sizes = [min(solid(body).size) for body in scene.bodies() if body.mass]
+    return exponent_of(min(sizes))
+
+
+def apart(state: State, problem: Any) -> tuple[float, float]:
+    """How far W and q of a step's problem are from Siconos' own.
+
+    Of their normal components, relative to the largest entry. Siconos' q has, to a share 1 - theta,
+    the gyroscopic moments of the step before.
+    """
+    local = problem.condense()
+    n = slice(0, None, 3)
+    W, own = local.W.toarray()[n, n], state.told.W.toarray()[n, n]
+    w = float(np.abs(W - own).max() / np.abs(own).max())
+    q = float(np.abs(local.q[n] - state.told.q[n]).max() / np.abs(state.told.q).max())
+    return w, q
+
+
+# ---- choice
+
+
+def judged(folder: Path) -> dict[int, int]:
+    """The sweeps of the steps that were judged."""
+    path = folder / "sweeps.csv"
+    if not path.is_file():
+        return {}
+    with path.open(newline="") as file:
+        return {int(row["step"]): int(row["sweeps"]) for row in csv.DictReader(file)}
+
+
+def judge(name: str, folder: Path, most: int) -> None:
+    """Append the sweeps of each step that is not judged yet."""
+    scene, known = SCENES[name], judged(folder)
+    bodies = scene.bodies()
+    path = folder / "sweeps.csv"
+    if not known:
+        path.write_text("step,contacts,dof,sweeps\n", encoding="utf-8")
+    for number, recorded in files(folder).items():
+        if number in known:
+            continue
+        problem = problem_of(State.read(number, recorded, bodies), scene)
+        found = fclib.solve(
+            problem.condense(), "nsgs", tol=TOLERANCE, max_iterations=most, time_limit=math.inf
+        )
+        with path.open("a", encoding="utf-8") as file:
+            file.write(f"{number},{problem.nc},{problem.n},{found.iterations}\n")
+
+
+def candidates(name: str, folder: Path) -> Iterator[State]:
+    """The steps on which nsgs takes more than LEAST sweeps, without nearly equal ones."""
+    bodies, sweeps = SCENES[name].bodies(), judged(folder)
+    kept: dict[bytes, list[Any]] = {}
+    for number, path in files(folder).items():
+        if sweeps.get(number, 0) <= LEAST:
+            continue
+        state = State.read(number, path, bodies)
+        problem = problem_of(state, SCENES[name])
+        if not apart(state, problem)[0] <= EXACT:
+            continue
+        # contacts in the order of their bodies and places: another step may list them otherwise
+        order = np.lexsort((*state.told.point.T, *state.body.T))
+        W = problem.condense().W.tocsr()
+        places = (3 * order[:, None] + np.arange(3)).ravel()
+        W = W[places][:, places]
+        W.sort_indices()
+        key = state.body[order].tobytes()
+        if any(near(W, other) for other in reversed(kept.get(key, []))):
+            continue
+        kept.setdefault(key, []).append(W)
+        yield state
+
+
+def near(W: Any, other: Any) -> bool:
+    """Whether two matrices of the same contacts are nearly equal."""
+    apart = abs(W - other)
+    return bool(apart.max() <= NEAR * abs(other).max())
+
+
+def spread(found: list[State], count: int, seed: int) -> list[State]:
+    """So many at equal distances, from a place that the seed draws."""
+    distance = len(found) / count
+    first = np.random.default_rng(seed).uniform(0, distance)
+    return [found[int(first + k * distance)] for k in range(count)]
+
+
+def choose(name: str, folder: Path, out: Path, version: str, count: int) -> Path:
+    """Write the trajectory of the chosen steps."""
+    scene = SCENES[name]
+    found = list(candidates(name, folder))
+    if len(found) < count:
+        raise SystemExit(
+            f"{name}: {len(found)} different steps take nsgs more than {LEAST} sweeps, and {count}"
+            " are asked for: simulate more of it, or each step (--every 1), and judge them"
+        )
+    states = spread(found, count, SEED)
+    worst = np.max([apart(state, problem_of(state, scene)) for state in states], axis=0)
+    exponent = exponent_for(scene)
+    position, velocity, contacts = stored(states, scene, exponent)
+    title, description, application = WORDS[name]
+    described = Described(
+        name=name,
+        time_step=scene.step,
+        theta=scene.theta,
+        gyroscopic=True,
+        seed=SEED,
+        title=title,
+        description=description,
+        application=application,
+        authors=AUTHORS,
+        friction="Coulomb, the same coefficient everywhere",
+        parameters={**SIZES[name], "mu": scene.mu, "end": scene.end},
+    )
+    made = trajectory.Trajectory(
+        scene=described,
+        origin={
+            "collection": "rt444",
+            "version": version,
+            "engine": {
+                "name": "Siconos, with Bullet",
+                "version": siconos.version().partition(" in ")[0],
+            },
+            "script": f"FrictionalContactLibrary/fclib-scripts, {scene.script}",
+            "chosen here": CHOSEN,
+            "settings": {
+                "fclib": fclib.__version__,
+                "kept": f"nsgs to {TOLERANCE:g} takes more than {LEAST} sweeps; evenly spread",
+                "W_from_engine": float(worst[0]),
+                "q_from_engine": float(worst[1]),
+            },
+        },
+        exponent=exponent,
+        number=np.arange(count),
+        step=np.array([state.number for state in states]),
+        position=position,
+        velocity=velocity,
+        handed=contacts,
+    )
+    problems = [made.problem(k).problem for k in range(count)]
+    digests = tuple(_digest.digest(problem) for problem in problems)
+    if len(set(digests)) < count:
+        raise SystemExit(f"{name}: two of the chosen problems are equal")
+    made = replace(
+        made,
+        digest=digests,
+        structure=tuple(_digest.structure(problem) for problem in problems),
+        sketch=np.stack([_digest.sketch(problem) for problem in problems]),
+    )
+    path = out / f"rt444/{name}-{version}{trajectory.SUFFIX}"
+    trajectory.write(path, made)
+    print(
+        f"{path}: {count} of {len(found)} steps, {path.stat().st_size} bytes;"
+        f" W differs from Siconos' by {worst[0]:.1e}, q by {worst[1]:.1e}"
+    )
+    return path
+
+
+def status(states: Path) -> None:
+    """How far each scene is."""
+    for name, scene in SCENES.items():
+        found, sweeps = files(states / name), judged(states / name)
+        hard = sum(count > LEAST for count in sweeps.values())
+        last = max(found, default=0) * scene.step
+        print(
+            f"{name}: {last:.2f} of {scene.end:g} s, {len(found)} steps recorded, {len(sweeps)}"
+            f" judged, {hard} take more than {LEAST} sweeps; wanted {PROBLEMS[name]}"
+        )
+
+
+def main() -> None:
+    """One command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("command", choices=("simulate", "judge", "choose", "status"))
+    parser.add_argument("scene", nargs="?", choices=list(SCENES))
+    parser.add_argument("--states", type=Path, required=True, help="folder of recorded steps")
+    parser.add_argument("--every", type=int, default=4, help="record one step in so many")
+    parser.add_argument("--end", type=float, help="of a simulation [s]; by default the scene's")
+    parser.add_argument("--most", type=int, default=MOST, help="sweeps of a judgement")
+    parser.add_argument("--out", type=Path, help="folder of trajectories")
+    parser.add_argument("--version", default="1")
+    parser.add_argument("--count", type=int, help="problems; by default as in the report")
+    own = parser.parse_args()
+    if own.command == "status":
+        return status(own.states)
+    if own.scene is None or (own.command == "choose" and own.out is None):
+        parser.error("name a scene, and a folder for choose (--out)")
+    folder = own.states / own.scene
+    if own.command == "simulate":
+        simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end)
+    elif own.command == "judge":
+        judge(own.scene, folder, own.most)
+    else:
+        choose(own.scene, folder, own.out, own.version, own.count or PROBLEMS[own.scene])
+    return None
+
+
+if __name__ == "__main__":
+    main()

@@ -67,12 +67,17 @@ GROUPS = {
     "families-robots": ("robots",),
     "families-machines": ("machines",),
     "families-simulators": ("simulators",),
+    "families-decks": ("decks",),
     "families-grains": ("granular", "rolling", "planar"),
     "families-dynamics": ("impacts", "existence", "dynamics"),
     "families-ladder": ("ladder", "local"),
 }
 # not on them: without stored states, and they look like another one of their group
-LIKE = {"CubesH8x20": "CubesH8", "ChuteLocalProblems": "LocalProblems"}
+LIKE = {
+    "CubesH8x20": "CubesH8",
+    "ElasticCubesx20": "ElasticCubes",
+    "ChuteLocalProblems": "LocalProblems",
+}
 TILE, CAPTION, COLUMNS = (240, 180), 24, 4
 SHADES = 128  # of a sheet
 LANDED = 60  # steps after which what is simulated for a sheet has something to show

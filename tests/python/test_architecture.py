@@ -89,7 +89,7 @@ PYTHON: dict[str, set[str]] = {
     "analysis": {"_core", "_digest", "_judge", "_registry", "_solve", "_symmetry"},
     "scenes": {"_core", "_entry_points", "_geometry", "_suggest"},
     "simulate": {"_core", "_geometry", "_origin", "_solve", "scenes"},
-    "recorders": {"_core", "_origin", "_solve", "external"},
+    "recorders": {"_core", "_origin", "_solve", "external", "scenes"},
     "collections": {
         "_core",
         "_digest",

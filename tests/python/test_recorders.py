@@ -870,7 +870,8 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
     for arguments, message in (
         (
             ["nothing", "x.py"],
-            "no engine 'nothing' is recorded; there is: drake, newton, pybullet, siconos",
+            "no engine 'nothing' is recorded; there is: drake, lmgc90, mujoco, newton, pybullet,"
+            " siconos",
         ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):

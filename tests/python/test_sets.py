@@ -339,6 +339,7 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "robots",
         "machines",
         "simulators",
+        "decks",
         "rr9118",
     }
     families = {tuple(origin.split("/")[:2]) for origin in origins}

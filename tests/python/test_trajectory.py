@@ -468,6 +468,7 @@ NOT_SIMULATED = {
     "ChuteLocalProblems",
     "FrictionRange",
     "Jammed",
+    "LMGC90Bridge",
     "LocalProblems",
     "ManySolutions",
     "MassRatios",
@@ -578,6 +579,8 @@ def check_digest(folder: str, states: Any, place: int, problem: Any) -> None:
 def deepest(name: str, states: Any) -> float:
     """How deep bodies may be in each other [m]."""
     folder = name.rpartition("-")[0]
+    if states.scene.interactions:
+        return float("inf")  # the laws of a deck keep penetrations
     if states.handed is not None:
         size = min(min(one.size) for one in states.handed.solids if one.mass)
     else:

@@ -1,7 +1,8 @@
-"""``fclib simulate``: a MuJoCo scene becomes a set of problems."""
+"""``fclib simulate``: a MuJoCo scene, or a deck of LMGC90, becomes a set of problems."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,7 @@ from fclib.cli._build import (
 )
 from fclib.cli._output import Json, Merit, MeritKind, err, fail, words_of
 from fclib.collections.plan import ON_DEMAND
+from fclib.scenes.shared import deck, deck_scene
 
 
 class Unsolved(str, Enum):
@@ -34,7 +36,8 @@ def command(
     scene: Annotated[
         Path,
         typer.Argument(
-            help="An MJCF file, a URDF file, or an input.dat of Siconos.", show_default=False
+            help="An MJCF file, a URDF file, an input.dat of Siconos, or an LMGC90 deck (DATBOX).",
+            show_default=False,
         ),
     ],
     steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 500,
@@ -42,7 +45,21 @@ def command(
         "problems"
     ),
     time_step: Annotated[
-        float | None, typer.Option(help="Step [s]; by default the file's own.", min=1e-12)
+        float | None,
+        typer.Option(help="Step [s]; by default the file's own. A deck has none.", min=1e-12),
+    ] = None,
+    theta: Annotated[
+        float | None,
+        typer.Option(
+            help="Of the theta scheme; by default 1, for a deck 0.5.",
+            min=0.5,
+            max=1.0,
+            show_default=False,
+        ),
+    ] = None,
+    period: Annotated[
+        tuple[float, float] | None,
+        typer.Option(help="Of a deck: periods along x and y [m].", show_default=False),
     ] = None,
     restitution: Annotated[
         float, typer.Option(help="Newton's coefficient of restitution.", min=0.0, max=1.0)
@@ -129,7 +146,7 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF file, a URDF file or an input.dat of Siconos, and store its problems.
+    """Simulate a model or a deck, and store its problems.
 
     What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.
@@ -152,31 +169,66 @@ def command(
     for name, equals, place in pairs:
         if not (name and equals and place):
             raise typer.BadParameter("--package takes NAME=DIR")
+    only_files = {
+        "--restitution": restitution,
+        "--law": law != "velocity",
+        "--activation": activation,
+        "--planar": planar,
+        "--keyframe": keyframe,
+        "--ctrl": ctrl,
+        "--policy": policy,
+        "--states": states,
+        "--package": package,
+        "--ignore": ignore,
+        "--floating": floating,
+        "--ground": ground is not None,
+        "--friction": friction is not None,
+    }
+    is_deck = scene.is_dir()
+    for name, given in only_files.items():
+        if is_deck and given:
+            raise typer.BadParameter(f"{name} is not for decks: a deck says all but step and theta")
+    if is_deck and time_step is None:
+        raise typer.BadParameter("a deck does not say its step: --time-step")
+    if period is not None and not is_deck:
+        raise typer.BadParameter("--period is for decks of LMGC90")
     try:
-        from fclib.simulate import ALLOWANCE, MujocoModel, control_of, logged
+        from fclib.simulate import ALLOWANCE, MujocoModel, control_of, logged, model_of
     except ImportError as error:
         fail(str(error))
     options = {} if merit is MeritKind.both else {"merit": merit.value}
     try:
-        loaded = scenes.Scene.from_file(
-            scene,
-            time_step=time_step,
-            restitution=restitution,
-            law=law,  # type: ignore[arg-type]
-            planar=planar,
-            keyframe=keyframe,
-            packages={name: place for name, _, place in pairs},
-            ignore=tuple(ignore or ()),
-            activation=activation,
-            floating=floating,
-            ground=ground,
-            friction=friction,
-        )
-        model = MujocoModel(loaded, strict=strict)
+        if is_deck:
+            assert time_step is not None
+            loaded = deck_scene.scene_of(
+                deck.read(scene),
+                time_step=time_step,
+                theta=0.5 if theta is None else theta,
+                period=period,
+            )
+        else:
+            loaded = scenes.Scene.from_file(
+                scene,
+                time_step=time_step,
+                restitution=restitution,
+                law=law,  # type: ignore[arg-type]
+                planar=planar,
+                keyframe=keyframe,
+                packages={name: place for name, _, place in pairs},
+                ignore=tuple(ignore or ()),
+                activation=activation,
+                floating=floating,
+                ground=ground,
+                friction=friction,
+            )
+            if theta is not None:
+                loaded = replace(loaded, theta=theta)
+        model = model_of(loaded, strict=strict)
         control = str(ctrl) if ctrl is not None else policy or ""
         if control:
             control_of(control)
         if states is not None:
+            assert isinstance(model, MujocoModel)
             steps = len(logged(states, model)[0])
         plan = collections.Plan(
             scene=loaded,
@@ -203,23 +255,24 @@ def command(
         fail(words_of(error))
     for line in model.left_out:
         err.print(f"Left out: {line}", highlight=False)
-    if model.untouchable:
+    rigid = model if isinstance(model, MujocoModel) else None
+    if rigid and rigid.untouchable:
         remedy = (
             " (the root of a URDF file is welded to the world, and there is no ground: --floating,"
             " --ground)"
             if "<robot" in loaded.xml and not floating and ground is None
             else ""
         )
-        err.print(f"Note: {model.untouchable}{remedy}", highlight=False)
-    if law == "velocity":
+        err.print(f"Note: {rigid.untouchable}{remedy}", highlight=False)
+    if loaded.law == "velocity":
         err.print(f"Closed gaps: within {ALLOWANCE}{further(activation)}", highlight=False)
     if merit is MeritKind.natural:
         err.print(
             "Solved: by the error of the natural map alone; the scaled one is not looked at",
             highlight=False,
         )
-    if model.keyframe:
-        err.print(f"From the keyframe {model.keyframe!r}", highlight=False)
+    if rigid and rigid.keyframe and not is_deck:
+        err.print(f"From the keyframe {rigid.keyframe!r}", highlight=False)
     doing = f"Simulating {loaded.name}" if states is None else f"{states}: {loaded.name}"
     err.print(f"{doing}, {steps} steps ...", highlight=False)
     build_plans([plan], folder, 1, pictures, as_json)

@@ -44,16 +44,17 @@ SETS: dict[str, tuple[str, str]] = {
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
     "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
+    "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
     "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("15", "all families that came after RT-0444"),
+    "extended": ("16", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("9", "what most solvers fail on, of standard and of the later sets"),
     "tiny": ("6", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
-    *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "rr9118"),
+    *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "decks", "rr9118"),
 )
 
 

@@ -54,7 +54,8 @@ from fclib import _core, _digest
 from fclib.collections import handed as engines
 from fclib.collections.handed import Handed
 from fclib.scenes import Scene
-from fclib.scenes.shared.solids import Bed, Block, Load, Solids
+from fclib.scenes.shared.interaction import Course, Drive, Interaction
+from fclib.scenes.shared.solids import Bed, Block, HexMesh, Load, Solids, Surface
 
 if TYPE_CHECKING:
     from fclib._core import ProblemInfo
@@ -405,6 +406,11 @@ def record(scene: Scene) -> dict[str, Any]:
         del known["ground"]
     if not scene.allowance:
         del known["allowance"]
+    for name in ("interactions", "drives", "left_out"):
+        if not getattr(scene, name):
+            del known[name]
+    if scene.solids is not None and not scene.solids.meshes:
+        del known["solids"]["meshes"]
     return known
 
 
@@ -415,14 +421,39 @@ def scene_of(known: Mapping[str, Any]) -> Scene:
         name: tuples(value) if name != "parameters" else value for name, value in known.items()
     }
     if known["solids"] is not None:
-        solids = {name: tuples(value) for name, value in known["solids"].items()}
+        solids = {
+            name: value if name == "meshes" else tuples(value)
+            for name, value in known["solids"].items()
+        }
         for name, kind in (("blocks", Block), ("beds", Bed), ("loads", Load)):
             own: Any = kind
             solids[name] = tuple(
                 own(**{key: tuples(value) for key, value in part.items()}) for part in solids[name]
             )
+        solids["meshes"] = tuple(mesh_of(mesh) for mesh in solids.get("meshes", ()))
         values["solids"] = Solids(**solids)
+    interactions, drives = known.get("interactions", ()), known.get("drives", ())
+    values["interactions"] = tuple(
+        Interaction(**{key: tuples(value) for key, value in one.items()}) for one in interactions
+    )
+    values["drives"] = tuple(
+        Drive(
+            dof=one["dof"],
+            velocity=one["velocity"],
+            course=Course(**{key: tuples(value) for key, value in one["course"].items()}),
+        )
+        for one in drives
+    )
     return Scene(**values)
+
+
+def mesh_of(known: Mapping[str, Any]) -> HexMesh:
+    """The mesh of a record."""
+    values = {name: tuples(value) for name, value in known.items()}
+    values["surfaces"] = tuple(
+        Surface(**{key: tuples(value) for key, value in one.items()}) for one in known["surfaces"]
+    )
+    return HexMesh(**values)
 
 
 def tuples(value: Any) -> Any:

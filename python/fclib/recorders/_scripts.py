@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fclib.recorders import _drake, _mujoco, _newton, _pybullet, _siconos
+from fclib.recorders import _drake, _lmgc90, _mujoco, _newton, _pybullet, _siconos
 from fclib.recorders._recorded import Recording
 
 
@@ -134,8 +134,9 @@ def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequ
     return run
 
 
-ENGINES: Final[dict[str, Callable[[Recording, Path, Sequence[str]], None]]] = {
+ENGINES: Final[dict[str, Callable[..., None]]] = {
     "drake": _in_this_process(_steps_of_drake, "pydrake"),
+    "lmgc90": _lmgc90.record,
     "mujoco": _in_this_process(_steps_of_mujoco, "mujoco"),
     "newton": _in_this_process(_steps_of_newton, "newton"),
     "pybullet": _in_this_process(_steps_of_pybullet, "pybullet"),
@@ -150,20 +151,27 @@ def record_script(
     *,
     every: int = 1,
     arguments: Sequence[str] = (),
+    **deck: Any,
 ) -> Recording:
     """Run a script, and write each `every`-th step of its engine that has contacts.
 
+    For LMGC90 the script may be the folder of a deck; `deck` has its steps, time_step and theta,
+    as `fclib.recorders.lmgc90` takes them.
+
     Raises:
-        ValueError: the engine is not one of `ENGINES`, or `every` is below 1.
+        ValueError: the engine is not one of `ENGINES`, or `every` is below 1; a deck is wrong.
         ImportError: the engine is not installed.
         OSError: the script cannot be read, or the folder not written; it may hold no files.
-        ChildProcessError: a script of Siconos ended with an error; steps before it are written.
+        ChildProcessError: Siconos or LMGC90 ended with an error; steps before it are written.
     """
     if engine not in ENGINES:
         raise ValueError(f"no engine {engine!r} is recorded; there is: {', '.join(ENGINES)}")
     script = Path(script)
-    if not script.is_file():
+    is_deck = engine == "lmgc90" and script.is_dir()
+    if not script.is_file() and not is_deck:
         raise FileNotFoundError(f"{script}: there is no such script")
+    if deck and not is_deck:
+        raise ValueError(f"{', '.join(deck)}: only for the folder of a deck of LMGC90")
     recording = Recording(folder, every)
-    ENGINES[engine](recording, script, arguments)
+    ENGINES[engine](recording, script, arguments, **deck)
     return recording

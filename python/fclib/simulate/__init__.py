@@ -12,7 +12,9 @@ moreau_jean.py    the scheme: a system at an instant becomes a problem. Needs no
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
 equalities.py     MuJoCo's equalities: rows that follow from others, rows that contradict them
 mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and its unsupported features
-deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
+deformable.py     the model of elastic bodies, by finite elements, with contacts between meshes
+hexahedra.py      mass and stiffness of meshes of hexahedra of any shape
+drives.py         velocities and forces that a scene gives
 plane.py          contacts of bodies that move in a plane
 periodic.py       a periodic cell: ghosts of bodies, and their part of H
 relax.py          moves bodies apart that are deep in each other

@@ -1,4 +1,7 @@
-"""Elastic blocks by finite elements, in contact with each other and with a rigid floor.
+"""Elastic bodies by finite elements, in contact with each other and with a rigid floor.
+
+They are blocks, of equal elements, or meshes of hexahedra of any shape (`hexahedra.py`), which
+touch by the interactions of their scene: nodes of one surface and faces of another.
 
 Hexahedra with 8 nodes, linear isotropic elasticity, consistent mass:
 
@@ -40,14 +43,16 @@ import scipy.sparse as sp
 
 from fclib.scenes import Scene
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.solids import Block, Load, Solids
-from fclib.simulate import _skfem
+from fclib.scenes.shared.solids import Block, HexMesh, Load, Solids
+from fclib.simulate import _skfem, hexahedra
 from fclib.simulate._mujoco import mujoco
+from fclib.simulate.drives import Drives
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
 from fclib.simulate.rounding import ELASTIC
 
 Indices = npt.NDArray[np.int64]
 
+SURFACE: Final = "surface"
 FACES: Final = ("x-", "x+", "y-", "y+", "z-", "z+")
 OPPOSED: Final = -0.9  # scalar product of the normals of two faces that count as facing each other
 OUTSIDE: Final = 1e-3  # distance beyond its edges at which a face is still touched, in half widths
@@ -67,7 +72,8 @@ class Mesh:
 
     x: Vector  # (k x 3) nodes [m]
     elements: Indices  # (8 x elements) nodes
-    # for each face: (quads x 4) nodes, in a ring about the outward normal
+    # for each face: (quads x 4) nodes, in a ring about the outward normal; of a mesh of any shape
+    # SURFACE is its one face, without a normal
     quads: dict[str, Indices]
     normals: dict[str, Vector]  # for each face: (3)
 
@@ -76,14 +82,17 @@ class DeformableModel:
     """A `ContactModel` made of the elastic blocks of a scene."""
 
     def __init__(self, scene: Scene) -> None:
-        """ImportError without scikit-fem, ValueError if the scene has no blocks or no step."""
-        if scene.solids is None or not scene.solids.blocks:
+        """ImportError without scikit-fem, ValueError if the scene has no blocks or no step.
+
+        Meshes need no scikit-fem.
+        """
+        if scene.solids is None or not (scene.solids.blocks or scene.solids.meshes):
             raise ValueError(f"{scene.name}: has no elastic blocks")
         if scene.time_step is None:
             raise ValueError(f"{scene.name}: a deformable scene needs a time step")
-        skfem = _skfem.load()
+        skfem = _skfem.load() if scene.solids.blocks else None
         self.scene, self.solids = scene, scene.solids
-        self.left_out: tuple[str, ...] = ()
+        self.left_out = scene.left_out
         self.time_step = float(scene.time_step)
 
         M, K, self.meshes = [], [], []
@@ -98,6 +107,24 @@ class DeformableModel:
             K.append(assembled(mesh, first, turn @ stiffness @ turn.T))
             self.meshes.append(mesh)
             first += len(mesh.x)
+        for i, own in enumerate(self.solids.meshes):
+            try:
+                mass, stiffness = hexahedra.matrices(
+                    np.array(own.nodes),
+                    np.array(own.elements),
+                    own.young,
+                    own.poisson,
+                    own.density,
+                    lumped=own.lumped,
+                )
+            except ValueError as error:
+                raise ValueError(f"{scene.name}: mesh {i + 1}: {error}") from None
+            M.append(mass)
+            K.append(stiffness)
+            elements = first + np.array(own.elements, np.int64)
+            quads = {SURFACE: hexahedra.surface(elements)}
+            self.meshes.append(Mesh(np.array(own.nodes), elements.T, quads, {}))
+            first += len(own.nodes)
         self.reference = np.concatenate([mesh.x for mesh in self.meshes])  # (nodes x 3) [m]
         sizes = [len(mesh.x) for mesh in self.meshes]
         self.body = np.repeat(np.arange(len(sizes)), sizes)  # (nodes) the block of each
@@ -113,12 +140,22 @@ class DeformableModel:
         self.weight = self.M @ np.tile((0.0, 0.0, -self.solids.gravity), first)  # (n) [N]
         self._loads = [(load, load_mass(self, load)) for load in self.solids.loads]
         self._floor = floor_nodes(self.meshes, self.solids)
-        self._candidates = candidates(self.meshes, self.solids.reach)
         edges = [np.divide(block.size, block.elements).min() for block in self.solids.blocks]
+        self._time = 0.0
+        self._drives = Drives.of(scene.name, scene.drives, n)
+        if self.solids.meshes:
+            self._candidates = meeting(scene)
+            edges = [smallest_edge(mesh) for mesh in self.meshes]
+            self._u = starts(self.solids.meshes, "displacement")
+            self._v = starts(self.solids.meshes, "velocity")
+        else:
+            self._candidates = candidates(self.meshes, self.solids.reach)
+            self._u = np.zeros(n)
+            velocities = [block.velocity for block in self.solids.blocks]
+            self._v = np.repeat(velocities, sizes, axis=0).ravel()
         self._edge = float(min(edges))
-
-        self._u, self._time = np.zeros(n), 0.0
-        self._v = np.repeat([block.velocity for block in self.solids.blocks], sizes, axis=0).ravel()
+        if self._drives:
+            self._drives.begin(self._v, 0.0)
 
     @property
     def position(self) -> Vector:
@@ -166,6 +203,12 @@ class DeformableModel:
         speed = float(np.linalg.norm(v.reshape(-1, 3), axis=1).max(initial=0.0))
         reach = max(2 * h * speed + h**2 * self.solids.gravity, SKIN * self._edge)
         reach += self.scene.activation
+        if self.scene.interactions:
+            reach += self.solids.reach
+        driven = None
+        if self._drives:
+            force += self._drives.force(self._time, h, self.scene.theta)
+            driven = self._drives.driven(self._time + h)
         H, contacts = self.contacts(reach)
         n = len(v)
         nothing = sp.csc_array((n, 0))
@@ -180,6 +223,7 @@ class DeformableModel:
             np.zeros(0),
             self.trees,
             rounding=2.0**ELASTIC,
+            driven=driven,
         )
 
     def loads(self, time: float) -> Vector:
@@ -220,12 +264,17 @@ class DeformableModel:
         slaves = np.concatenate((low, slave[kept]))
         masters = np.concatenate((np.zeros(len(low), np.int64), 1 + self.body[quad[kept, 0]]))
         gaps = np.concatenate((x[low, 2], gap[kept]))
+        mu, interaction = np.full(len(slaves), self.solids.mu), None
+        if self._candidates.interaction is not None:
+            interaction = self._candidates.interaction[near][kept]
+            mu = np.array([one.mu for one in self.scene.interactions])[interaction]
         contacts = Contacts(
             pair=np.column_stack((masters, slaves)),
             point=x[slaves] - 0.5 * gaps[:, None] * frame[:, 0],
             frame=frame,
             gap=gaps,
-            mu=np.full(len(slaves), self.solids.mu),
+            mu=mu,
+            interaction=interaction,
         )
         # the slave moves against the floor, or against the mean of its master's nodes
         nodes = np.column_stack((slaves, np.zeros((len(slaves), 4), np.int64)))
@@ -351,6 +400,7 @@ class Candidates:
 
     slave: Indices  # (k)
     quad: Indices  # (k x 4)
+    interaction: Indices | None = None  # (k) its number in the scene; None: no such
 
 
 def slaves_of(mesh: Mesh, face: str) -> Indices:
@@ -396,6 +446,47 @@ def _candidates(meshes: list[Mesh], reach: float) -> Iterator[tuple[Indices, Ind
                     away = (every[nodes].mean(axis=0) - every[quads[0, 0]]) @ normal
                     if nodes.size and abs(away) <= reach:
                         yield nodes, quads
+
+
+def meeting(scene: Scene) -> Candidates:
+    """The nodes of all candidates with the quads that they see, on other meshes."""
+    assert scene.solids is not None
+    kinds = {frozenset(one.kinds): i for i, one in enumerate(scene.interactions)}
+    surfaces = []
+    first = 0
+    for body, mesh in enumerate(scene.solids.meshes):
+        surfaces += [(body, s, first + np.array(s.quads, np.int64)) for s in mesh.surfaces]
+        first += len(mesh.nodes)
+    slave: list[Indices] = [np.zeros(0, np.int64)]
+    quad: list[Indices] = [np.zeros((0, 4), np.int64)]
+    interaction: list[Indices] = [np.zeros(0, np.int64)]
+    for body, own, candidate in surfaces:
+        for other, touched, quads in surfaces:
+            number = kinds.get(frozenset((own.kind, touched.kind)))
+            if number is None or body == other or not own.candidate or touched.candidate:
+                continue
+            nodes = np.unique(candidate)
+            slave.append(np.repeat(nodes, len(quads)))
+            quad.append(np.tile(quads, (len(nodes), 1)))
+            interaction.append(np.full(len(nodes) * len(quads), number))
+    return Candidates(np.concatenate(slave), np.concatenate(quad), np.concatenate(interaction))
+
+
+def smallest_edge(mesh: Mesh) -> float:
+    """The shortest edge of a mesh's surface [m]; its nodes are numbered in the whole system."""
+    quads = mesh.quads[SURFACE]
+    corners = mesh.x[quads - mesh.elements.min()]
+    edges = corners - np.roll(corners, 1, axis=1)
+    return float(np.linalg.norm(edges, axis=2).min())
+
+
+def starts(meshes: tuple[HexMesh, ...], name: str) -> Vector:
+    """Displacements or velocities of all nodes at the start (n)."""
+    found = [
+        np.array(getattr(mesh, name)) if getattr(mesh, name) else np.zeros((len(mesh.nodes), 3))
+        for mesh in meshes
+    ]
+    return np.concatenate(found).ravel()
 
 
 def project(points: Vector, corners: Vector) -> tuple[Vector, Vector, Vector]:
@@ -460,7 +551,7 @@ def picture(model: DeformableModel, x: Vector) -> str:
     count = len(model.meshes)
     assets, bodies = [], []
     for i, mesh in enumerate(model.meshes):
-        quads = np.concatenate([mesh.quads[face] for face in FACES])
+        quads = np.concatenate(list(mesh.quads.values()))
         corner = 4 * np.arange(len(quads))[:, None]
         triangles = (corner + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
         sheet = np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (len(quads), 1))

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from fclib._geometry import KINDS, Bodies, Contacts
 from fclib.simulate import moreau_jean
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.deformable import FACES, DeformableModel
+from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.rounding import ELASTIC, RIGID
 
@@ -302,7 +302,7 @@ def elastic(model: DeformableModel, contacts: moreau_jean.Contacts) -> tuple[Con
     displaced = model.places()
     vertices, moved, faces = [], [], []
     for mesh in model.meshes:
-        quads = np.concatenate([mesh.quads[face] for face in FACES])
+        quads = np.concatenate(list(mesh.quads.values()))
         nodes, local = np.unique(quads, return_inverse=True)
         vertices.append(displaced[nodes])
         moved.append(displaced[nodes] - model.reference[nodes])

@@ -53,6 +53,12 @@ so that z = 0 and r_N = h F at every solution.
 In the plane a contact has two components, N and T, and with rolling friction a third one, R, about
 the normal of the plane.
 
+Shapes that have interactions (fclib.scenes.shared.interaction) meet by the law of gaps, each pair
+by its own: contacts count up to its alert distance.
+
+Velocities that are given are no unknowns: with v = (v_1, v_2) and v_2' known, f_1 becomes
+f_1 - M_12 v_2', and w becomes w + H_2^T v_2'.
+
 A problem holds the bodies that the contacts move. A body that no chain of contacts, bilateral
 constraints and inertia links to a contact moves freely, M v' = M v + h F + G lambda. With
 `all_bodies` the problem holds these bodies too.
@@ -78,6 +84,7 @@ import scipy.sparse as sp
 
 from fclib import _core, _solve
 from fclib.scenes import Law
+from fclib.scenes.shared.interaction import Interaction
 from fclib.simulate.arrays import (
     Sparse,
     Vector,
@@ -112,6 +119,7 @@ class Contacts:
     mu: Vector  # (nc) coefficient of friction
     mu_r: Vector | None = None  # (nc) coefficient of rolling friction [m]; None: no rolling
     planar: bool = False  # d = 2, 3 with rolling
+    interaction: npt.NDArray[np.int64] | None = None  # (nc) its number in the scene; None: no such
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -125,6 +133,7 @@ class Contacts:
             self.mu.take(which),
             None if self.mu_r is None else self.mu_r.take(which),
             self.planar,
+            None if self.interaction is None else self.interaction.take(which),
         )
 
     @property
@@ -221,6 +230,15 @@ class System:
     dry: DryFriction | None = None
     rounding: float = 0.0  # rounding of each coordinate of a stored state [m], [rad]
     shape_rounding: Vector | None = None  # rounding of each geometry's surface [m]; None: exact
+    driven: Driven | None = None
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Degrees of freedom whose velocity at the end of the step is given."""
+
+    dof: npt.NDArray[np.int64]  # (k)
+    velocity: Vector  # (k)
 
 
 class ContactModel(Protocol):
@@ -262,6 +280,8 @@ class MoreauJean:
     activation: float = 0.0
     allowance: bool = True  # velocity law: whether gaps within `allowances` count as closed
     all_bodies: bool = False  # whether problems also hold bodies that nothing touches
+    # gap law: the law of each contact that has an interaction, in place of stabilization
+    interactions: tuple[Interaction, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.h <= LONGEST:
@@ -280,10 +300,12 @@ class MoreauJean:
             raise ValueError(f'the law must be "velocity" or "gap", not {self.law!r}')
         if self.law == "gap" and self.restitution:
             raise ValueError("the gap law is inelastic: restitution needs the velocity law")
+        if self.law != "gap" and self.interactions:
+            raise ValueError('interactions have laws of gaps: the law must be "gap"')
 
     def assemble(self, model: ContactModel) -> System:
         """The model's system, with the contacts that this law needs."""
-        return model.assemble(self.h, shared_speed=self.law == "gap")
+        return model.assemble(self.h, shared_speed=self.law == "gap" and not self.interactions)
 
     def problem(
         self, system: System, v: Vector, info: _core.ProblemInfo | None = None
@@ -307,7 +329,12 @@ class MoreauJean:
             middle = contacts.gap
             if self.theta < 1:
                 middle = middle + (1 - self.theta) * h * transposed_times(H, v)[0::d]
-            share = np.where(middle > 0, 1.0, self.stabilization)
+            undone: Vector | float = self.stabilization
+            if contacts.interaction is not None:
+                active, undone = self.seen(contacts.interaction, middle)
+                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
+                middle = middle[active]
+            share = np.where(middle > 0, 1.0, undone)
             w_n = share * middle / h
 
         w = np.zeros(d * len(contacts))
@@ -325,13 +352,34 @@ class MoreauJean:
                 system.dry, h, M, H, G, f, w, contacts, tree
             )
 
+        given = system.driven
+        if given is not None:
+            # their velocities are known: they go to the right sides, and leave the unknowns
+            moved = np.zeros(len(f))
+            moved[given.dof] = given.velocity
+            f, w, b = (
+                f - times(M, moved),
+                w + transposed_times(H, moved),
+                b + transposed_times(G, moved),
+            )
+            kept = np.setdiff1d(np.arange(len(f)), given.dof)
+            # contacts that move nothing else are none
+            new = np.full(len(f), -1, dtype=np.int32)
+            new[kept] = np.arange(len(kept), dtype=np.int32)
+            M, H, G = (rows_of(matrix, new) for matrix in (submatrix(M, kept), H, G))
+            f, tree = f[kept], tree[kept]
+            touching = np.flatnonzero(lengths_of(H.indptr).reshape(-1, d).any(axis=1))
+            if len(touching) < len(contacts):
+                columns = block_columns(touching, d)
+                contacts, H, w = contacts[touching], submatrix(H, columns), w[columns]
         if self.all_bodies:
             inside, rows = np.arange(len(f)), np.arange(len(b))
         else:
             inside, rows = linked(tree, M, H, G)
         whole = len(inside) == len(f) and len(rows) == len(b)
         # all auxiliary degrees of freedom have contacts
-        apart = rows[:0] if whole else np.setdiff1d(np.arange(len(v)), inside)
+        count = len(f) if given is not None else len(v)
+        apart = rows[:0] if whole else np.setdiff1d(np.arange(count), inside)
         if not whole:
             place = np.full(len(f), -1, dtype=np.int32)
             place[inside] = np.arange(len(inside), dtype=np.int32)
@@ -356,16 +404,34 @@ class MoreauJean:
         else:
             problem = _core.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
 
+        number = np.arange(len(v)) if given is None else kept[kept < len(v)]
+
         def free() -> Vector:
             velocity = np.zeros_like(v)
+            if given is not None:
+                velocity[given.dof] = given.velocity
             if apart.size:
                 others = np.setdiff1d(np.arange(len(b)), rows)
-                velocity[apart] = free_velocity(
+                velocity[number[apart]] = free_velocity(
                     all_M[apart][:, apart], all_G[apart][:, others], f[apart], b[others]
                 )
             return velocity
 
-        return StepProblem(problem, contacts, inside[inside < len(v)], free)
+        return StepProblem(problem, contacts, number[inside[inside < len(number)]], free)
+
+    def seen(
+        self, interaction: npt.NDArray[np.int64], middle: Vector
+    ) -> tuple[npt.NDArray[np.intp], Vector]:
+        """The contacts that their interactions (nc) take, by their gaps in the middle (nc) [m].
+
+        Also the shares of their penetrations that are undone in the step.
+        """
+        alert = np.array([one.alert for one in self.interactions])
+        stays_open = np.array([one.law == "VEL_SGR_CLB" for one in self.interactions], dtype=bool)
+        undone = np.array([one.law == "GAP_SGR_CLB" for one in self.interactions], dtype=float)
+        taken = (middle <= alert[interaction]) & ~(stays_open[interaction] & (middle > 0))
+        active = np.flatnonzero(taken)
+        return active, undone[interaction[active]]
 
 
 @dataclass(frozen=True)
@@ -579,6 +645,15 @@ def free_velocity(M: Sparse, G: Sparse, f: Vector, b: Vector) -> Vector:
         M=M, H=sp.csc_array((len(f), 0)), G=G, f=f, w=[], mu=[], b=b, spacedim=3
     )
     return np.asarray(_solve.solve(alone).solution.v)
+
+
+def rows_of(matrix: Sparse, new: npt.NDArray[np.int32]) -> Sparse:
+    """The rows of a matrix that have a new number (-1: they are left out)."""
+    entry = new.take(matrix.indices)
+    kept = entry >= 0
+    starts = np.concatenate(([0], np.cumsum(kept)))[matrix.indptr].astype(np.int32)
+    shape = (int((new >= 0).sum()), matrix.shape[1])
+    return by_columns(matrix.data[kept], entry[kept], starts, shape)
 
 
 def block_columns(blocks: npt.NDArray[np.intp], d: int) -> npt.NDArray[np.intp]:

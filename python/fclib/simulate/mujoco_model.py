@@ -34,9 +34,17 @@ from fclib.simulate.arrays import (
     submatrix,
     without_zeros,
 )
+from fclib.simulate.drives import Drives
 from fclib.simulate.equalities import Equalities
 from fclib.simulate.faces import complete_faces
-from fclib.simulate.moreau_jean import ROUNDINGS, Contacts, DryFriction, System, components
+from fclib.simulate.moreau_jean import (
+    ROUNDINGS,
+    Contacts,
+    DryFriction,
+    System,
+    block_columns,
+    components,
+)
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,
@@ -81,7 +89,7 @@ class MujocoModel:
         self.model: Any
         self.model, dropped = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
-        self.left_out = (*left_out(scene, self.model), *dropped)
+        self.left_out = (*scene.left_out, *left_out(scene, self.model), *dropped)
         self.untouchable = cannot_touch(self.model)  # the reason, in words
         if strict:
             refuse_unknown(scene, self.left_out)
@@ -89,6 +97,8 @@ class MujocoModel:
             refuse_out_of_plane(scene, self.model, self.data)
 
         m = self.model
+        self._drives = Drives.of(scene.name, scene.drives, m.nv)
+        self._meetings = Meetings.of(scene, m) if scene.interactions else None
         self._cell = None if scene.period is None else periodic_cell(scene, m)
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
@@ -133,6 +143,10 @@ class MujocoModel:
             raise ValueError(
                 f"{scene.name}: a position, a velocity or gravity at the start is not finite"
             )
+        if self._drives:
+            if self._gait:
+                raise ValueError(f"{scene.name}: has drives and a gait, of which one is known")
+            self._drives.begin(self.data.qvel, 0.0)
         if m.na:
             # MuJoCo's data for the rates of actuators
             m.opt.timestep = self.time_step
@@ -149,7 +163,7 @@ class MujocoModel:
         """Configuration (q, states of actuators, time or controls), a copy."""
         d = self.data
         parts = [d.qpos, d.act]
-        if self._gait:
+        if self._timed:
             parts.append([d.time])
         elif self.controlled:
             parts.append(d.ctrl)
@@ -159,6 +173,11 @@ class MujocoModel:
     def coordinates(self) -> int:
         """The number of entries of `position` of bodies; the later ones stay if bodies move."""
         return int(self.model.nq)
+
+    @property
+    def _timed(self) -> bool:
+        """Whether forces or velocities depend on the time."""
+        return self._gait is not None or self._drives is not None
 
     @property
     def has_gait(self) -> bool:
@@ -223,12 +242,19 @@ class MujocoModel:
         if self._cell:
             # such a scene has no limits: all pairs are geometries
             contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
+        if self._meetings:
+            kept, contacts = self._meetings.taken(contacts)
+            H = submatrix(H, block_columns(kept, contacts.dimension))
         G, violation = self._ties.columns(d, rows)
         if self._gait:
             # at the end of the step, as its springs are
             d.ctrl[:] = self._gait.controls(d.time + h)
         M = self._pattern.fill(d.M)
         force, held = self._force(h, M)
+        driven = None
+        if self._drives:
+            force = force + self._drives.force(d.time, h, self.scene.theta)
+            driven = self._drives.driven(d.time + h)
         C, K = self._linear or self._servos.linear(d, held)
         if self._dry is None or self._rubbing_tendons:
             self._dry = dry_friction(m, d, rows)
@@ -247,6 +273,7 @@ class MujocoModel:
             self._dry,
             self._rounding,
             self._shape_rounding,
+            driven,
         )
 
     def equalities(self) -> tuple[list[str], Vector]:
@@ -279,7 +306,7 @@ class MujocoModel:
         m, d = self.model, self.data
         own, act, rest = np.split(position, [m.nq, m.nq + m.na])
         d.qpos[:], d.act[:] = own, act
-        if self._gait:
+        if self._timed:
             d.time = float(rest[0])
         elif rest.size:
             self.control(rest)
@@ -330,6 +357,8 @@ class MujocoModel:
         reach = h * speed + h**2 * self._gravity
         # half of the activation for each of the two geometries
         reach += 0.5 * self.scene.activation
+        if self._meetings:
+            reach += self._meetings.alert
         if self.scene.allowance:
             # gaps that rounding opens, from the lengths that it turns
             reach += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + self._shape_rounding)
@@ -390,6 +419,41 @@ class MujocoModel:
                 f"{self.scene.name}: the mass matrix is singular (the largest velocity is"
                 f" {fastest:.3g}; the motion has diverged if that is huge)"
             )
+
+
+@dataclass(frozen=True)
+class Meetings:
+    """Which geometries of a model meet, and by which interaction of its scene."""
+
+    kind: npt.NDArray[np.int64]  # (ngeom) of each geometry, -1 for none
+    number: npt.NDArray[np.int64]  # (kinds x kinds) of the interactions, -1 for none
+    mu: Vector  # of each interaction
+    alert: Vector  # (ngeom) half of the largest alert distance [m]
+
+    @classmethod
+    def of(cls, scene: Scene, m: Any) -> Meetings:
+        """Those of a scene; the kind of a geometry is its first user value."""
+        user = m.geom_user[:, 0] if m.nuser_geom else np.full(m.ngeom, -1.0)
+        kinds = 1 + max(max(one.kinds) for one in scene.interactions)
+        kind = np.where(user < kinds, user, -1).astype(np.int64)
+        number = np.full((kinds, kinds), -1)
+        alert = np.zeros(kinds)
+        for i, one in enumerate(scene.interactions):
+            first, second = one.kinds
+            number[first, second] = number[second, first] = i
+            alert[[first, second]] = np.maximum(alert[[first, second]], one.alert)
+        mu = np.array([one.mu for one in scene.interactions])
+        return cls(kind, number, mu, np.where(kind >= 0, 0.5 * alert[kind], 0.0))
+
+    def taken(self, contacts: Contacts) -> tuple[npt.NDArray[np.intp], Contacts]:
+        """The contacts that have an interaction, and these with its number and friction."""
+        kinds = self.kind[contacts.pair]
+        number = np.where(
+            kinds.min(axis=1, initial=0) >= 0, self.number[kinds[:, 0], kinds[:, 1]], -1
+        )
+        kept = np.flatnonzero(number >= 0)
+        number = number[kept]
+        return kept, replace(contacts[kept], mu=self.mu[number], interaction=number)
 
 
 def crossed(a: Vector, b: Vector) -> Vector:

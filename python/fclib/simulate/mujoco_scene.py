@@ -97,7 +97,8 @@ def compiled(scene: Scene) -> Any:
                 # the text has changed, but meshes lie beside the file
                 spec.modelfiledir = str(scene.path.resolve().parent)
         if scene.period is not None:
-            add_ghosts(spec)
+            # six degrees of freedom a body: all are free
+            add_ghosts(spec, frozenset(d.dof // 6 for d in scene.drives if d.velocity))
         if spec.memory < 0:
             spec.memory = MEMORY
         if scene.ground is not None:

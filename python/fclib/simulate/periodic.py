@@ -93,13 +93,22 @@ class PeriodicCell:
         return sp.csr_array(entries, shape=(d.nefc, m.nv))
 
 
-def add_ghosts(spec: Any) -> None:
+def add_ghosts(spec: Any, driven: frozenset[int] = frozenset()) -> None:
     """Give each body of a model its ghosts. ValueError if one is not a single free body.
+
+    Bodies that are driven have none; they are given by their number, and come last.
 
     Across the boundary all colliding geometries touch each other, whatever their bits are.
     """
     spec.copy_during_attach = True
     bodies = list(spec.worldbody.bodies)
+    if driven != frozenset(range(len(bodies) - len(driven), len(bodies))):
+        raise ValueError("in a periodic scene bodies that are driven come last")
+    bodies = bodies[: len(bodies) - len(driven)]
+    # MuJoCo would copy keyframes with each body
+    keys = [(key.name, list(key.qpos), list(key.qvel)) for key in spec.keys]
+    for key in list(spec.keys):
+        spec.delete(key)
     for body in bodies:
         joints = list(body.joints)
         free = len(joints) == 1 and joints[0].type == mujoco.mjtJoint.mjJNT_FREE
@@ -121,3 +130,5 @@ def add_ghosts(spec: Any) -> None:
                 geom.mass = 0
                 geom.rgba = (0, 0, 0, 0)
                 geom.material = ""
+    for name, qpos, qvel in keys:
+        spec.add_key(name=name, qpos=qpos, qvel=qvel)

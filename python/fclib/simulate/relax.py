@@ -56,14 +56,15 @@ def relaxed(
         deepest: the bound, in diameters of the smallest body.
 
     Returns:
-        q itself if nothing is deeper, and for elastic bodies, which have no size. If bodies are
-        wedged so that no state is within the bound, the least deep state found.
+        q itself if nothing is deeper, for elastic bodies, which have no size, and if the scene has
+        interactions: their laws say what becomes of a penetration. If bodies are wedged so that no
+        state is within the bound, the least deep state found.
 
     Raises:
         As `ContactModel.assemble` and `fclib.solve` do.
     """
     size = model.smallest_size
-    if size is None or not isinstance(model, MujocoModel):
+    if size is None or not isinstance(model, MujocoModel) or model.scene.interactions:
         return position
     bound = deepest * 2 * size
     best, least, since = position, np.inf, 0

@@ -30,6 +30,7 @@ from fclib.simulate.moreau_jean import (
     keys,
 )
 from fclib.simulate.mujoco_model import MujocoModel
+from fclib.simulate.mujoco_scene import refuse_unknown
 
 Model: TypeAlias = MujocoModel | DeformableModel
 # gaps that count as closed
@@ -151,6 +152,8 @@ def model_of(scene: Scene, *, strict: bool = False) -> Model:
     """The model of a scene, at its start; raises as `simulate` does."""
     if scene.solids is None:
         return MujocoModel(scene, strict=strict)
+    if strict:
+        refuse_unknown(scene, scene.left_out)
     return DeformableModel(scene)
 
 
@@ -166,6 +169,7 @@ def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
         activation=scene.activation,
         allowance=scene.allowance,
         all_bodies=scene.all_bodies,
+        interactions=scene.interactions,
     )
 
 
@@ -409,6 +413,7 @@ def descriptions(
         **({"left_out": list(left_out)} if left_out else {}),
         **({"keyframe": scene.keyframe} if scene.keyframe else {}),
         **({"period": list(scene.period)} if scene.period else {}),
+        **({"laws": laws_of(scene)} if scene.interactions else {}),
         "time_step": scheme.h,
         "restitution": scheme.restitution,
         "law": scheme.law,
@@ -434,6 +439,8 @@ def descriptions(
         if text
     ]
     law = f"Newton impact e = {scheme.restitution:g}" if scheme.law == "velocity" else "gap law"
+    if scene.interactions:
+        law = f"laws of gaps {', '.join(laws_of(scene))}"
     words_of_components = (
         "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
     )
@@ -463,10 +470,17 @@ def descriptions(
     return of_step
 
 
+def laws_of(scene: Scene) -> list[str]:
+    """The laws of a scene's interactions, each once."""
+    return sorted({one.law for one in scene.interactions})
+
+
 def engine(scene: Scene) -> dict[str, str]:
-    """The simulator of a scene, with the version on which its numbers depend."""
+    """The simulator of a scene, with the version on which its numbers depend; none for meshes."""
     if scene.solids is None:
         return {"mujoco": _mujoco.VERSION}
+    if scene.solids.meshes:
+        return {}
     return {"scikit-fem": _skfem.VERSION}
 
 

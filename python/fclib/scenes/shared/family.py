@@ -16,6 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
 from fclib.scenes.shared import siconos_input
+from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
 
 Law = Literal["velocity", "gap"]
@@ -65,6 +66,11 @@ class Scene:
     ignore: tuple[str, ...] = ()
     # periods along x and y [m], with only free bodies; None: not periodic
     period: tuple[float, float] | None = None
+    # by the law of gaps: which kinds of shapes meet, each pair by its own law; empty: all. The kind
+    # of a geometry is its first user value
+    interactions: tuple[Interaction, ...] = ()
+    drives: tuple[Drive, ...] = ()  # velocities and forces that are given
+    left_out: tuple[str, ...] = ()  # what its source asks for and it lacks, one line each
     path: Path | None = None  # path of the MJCF file, if it refers to meshes beside it
     includes: Mapping[str, str] = field(default_factory=dict)  # texts of MJCF files in it, by path
 

@@ -15,6 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 # the looks do not act on the mechanics; angles in radians everywhere
+_FLOOR = """\
+    <geom name="floor" type="plane" size="0 0 1" pos="0 0 {floor_z!r}" material="floor"
+          condim="{condim}" friction="{floor_mu!r} 0 {floor_mu_r!r}"/>
+"""
 _DOCUMENT = """\
 <mujoco model="{name}">
   <compiler angle="radian" alignfree="true"/>
@@ -39,9 +43,7 @@ _DOCUMENT = """\
   <worldbody>
     <light type="directional" pos="0 0 0" dir="-0.72 0.22 -0.85"
            diffuse="0.56 0.55 0.52" specular="0.15 0.15 0.15" castshadow="true"/>
-    <geom name="floor" type="plane" size="0 0 1" pos="0 0 {floor_z!r}" material="floor"
-          condim="{condim}" friction="{floor_mu!r} 0 {floor_mu_r!r}"/>
-{bodies}
+{floor}{bodies}
   </worldbody>
 {rest}
 </mujoco>
@@ -63,8 +65,9 @@ def document(
     rest: Iterable[str] = (),
     velocity: Iterable[float] | None = None,
     multiccd: bool = True,
+    floor: bool = True,
 ) -> str:
-    """An MJCF document: the bodies above a horizontal floor.
+    """An MJCF document: the bodies above a horizontal floor, or without one.
 
     time_step in s, gravity (downwards) in m/s^2, floor_mu without unit, floor_mu_r in m, floor_z
     the floor's height in m; tile is the edge of the floor's squares in m; velocity at the start
@@ -84,14 +87,15 @@ def document(
         name=name,
         time_step=time_step,
         gravity=-gravity,
-        floor_mu=floor_mu,
         # two squares a texture
         tiles=0.5 / tile,
         assets=indent(assets),
         bodies=indent(bodies),
-        floor_z=floor_z,
-        condim=condim,
-        floor_mu_r=floor_mu_r,
+        floor=_FLOOR.format(
+            floor_mu=floor_mu, floor_z=floor_z, condim=condim, floor_mu_r=floor_mu_r
+        )
+        if floor
+        else "",
         rest=indent(elements),
     )
 

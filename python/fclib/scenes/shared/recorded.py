@@ -1,14 +1,20 @@
 """Steps of other engines as arrays in a file; their problems are made without the engine.
 
 The file is an .npz. `about` is JSON: engine, law, notes, of each field whether it is the engine's
-or follows from a formula, and the problems' digests. `half` has the half edges of the boxes. Of any
-other array the steps come one after another, and `NAME_ends` has the end of each.
+or follows from a formula, and the problems' digests. The bodies are boxes, of which `half` has the
+half edges, or polyhedra, with `vertices`, `faces` and their ends for each body. Of any other array
+the steps come one after another, and `NAME_ends` has the end of each.
+
+A step has M and H, or what they follow from: `mass`, of the file, and for H the places of contacts
+and the middles and axes of bodies in the step. The sums of H are taken in one order, so that it is
+the same everywhere, to the last bit.
 """
 
 from __future__ import annotations
 
 import functools
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, Final, TypeAlias
@@ -28,15 +34,15 @@ UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Step:
-    """A step of free boxes: what the engine made its equations of, and its own answer.
+    """A step of free bodies: what the engine made its equations of, and its own answer.
 
     M v = H r + f, u = H^T v + w; v has the velocity and the spin of each box in turn.
     """
 
     time: Vector  # (1) at its start [s]
     step: Vector  # (1) h [s]
-    M: Any  # (n x n)
-    H: Any  # (n x 3 nc)
+    M: Any = None  # (n x n); None: it follows from the masses of the file
+    H: Any = None  # (n x 3 nc); None: it follows from centre and axes
     f: Vector  # (n)
     w: Vector  # (3 nc)
     mu: Vector  # (nc)
@@ -50,6 +56,19 @@ class Step:
     gap: Any = None  # (nc) [m]
     place: Any = None  # (nb x 3) of the boxes at the start of the step [m]
     turn: Any = None  # (nb x 4) quaternions w, x, y, z
+    # of polyhedra, those that do not move too: in the middle of the step
+    centre: Any = None  # (nb x 3) [m]
+    axes: Any = None  # (nb x 3 x 3) columns
+
+
+@dataclass(frozen=True, eq=False)
+class Polyhedra:
+    """Bodies that are polyhedra: all of them, those that do not move too."""
+
+    moves: npt.NDArray[np.int64]  # (nb) 1 or 0
+    mass: Vector  # (n) of each degree of freedom of those that move
+    vertices: tuple[Vector, ...]  # of each body (k x 3), in its own frame [m]
+    faces: tuple[npt.NDArray[np.int64], ...]  # of each body (f x 3) triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +76,23 @@ class File:
     """The content of a file."""
 
     about: dict[str, Any]
-    half: Vector  # (nb x 3) [m]
+    half: Vector  # (nb x 3) of boxes [m]
     steps: tuple[Step, ...]
     digests: tuple[str, ...] = ()  # of the problems, as they were when the file was made
+    polyhedra: Polyhedra | None = None  # the bodies, if they are no boxes
 
 
 def write(path: Path, file: File) -> None:
     """Store steps."""
     about = json.dumps({**file.about, "digests": file.digests})
     arrays: dict[str, Any] = {"about": np.array(about), "half": file.half}
+    if file.polyhedra is not None:
+        own = file.polyhedra
+        arrays |= {"solid_moves": own.moves, "solid_mass": own.mass}
+        tables: dict[str, tuple[Any, ...]] = {"vertices": own.vertices, "faces": own.faces}
+        for name, rows in tables.items():
+            arrays[f"solid_{name}"] = np.concatenate(rows)
+            arrays[f"solid_{name}_of"] = np.cumsum([len(row) for row in rows])
     parts: dict[str, list[Any]] = {}
     for step in file.steps:
         for field in fields(Step):
@@ -91,6 +118,14 @@ def read(path: Path) -> File:
         arrays = {name: stored[name] for name in stored.files}
     about = json.loads(str(arrays.pop("about")))
     half = arrays.pop("half")
+    own = {name: arrays.pop(name) for name in list(arrays) if name.startswith("solid_")}
+    polyhedra = None
+    if own:
+        vertices, faces = (
+            tuple(np.split(own[f"solid_{name}"], own[f"solid_{name}_of"][:-1]))
+            for name in ("vertices", "faces")
+        )
+        polyhedra = Polyhedra(own["solid_moves"], own["solid_mass"], vertices, faces)
     parts = {
         name: np.split(values, arrays[f"{name}_ends"][:-1])
         for name, values in arrays.items()
@@ -98,29 +133,35 @@ def read(path: Path) -> File:
     }
     steps = []
     for k in range(len(parts["time"])):
-        own = {name: values[k] for name, values in parts.items()}
-        n = len(own["f"])
-        for name, columns in (("M", n), ("H", len(own["w"]))):
-            three = tuple(own.pop(f"{name}_{part}") for part in ("data", "indices", "indptr"))
-            own[name] = sp.csc_array(three, shape=(n, columns))
-        steps.append(Step(**own))
+        mine = {name: values[k] for name, values in parts.items()}
+        n = len(mine["f"])
+        for name, columns in (("M", n), ("H", len(mine["w"]))):
+            if f"{name}_data" in mine:
+                three = tuple(mine.pop(f"{name}_{part}") for part in ("data", "indices", "indptr"))
+                mine[name] = sp.csc_array(three, shape=(n, columns))
+        steps.append(Step(**mine))
     digests = tuple(about.pop("digests"))
-    return File(about, half, tuple(steps), digests)
+    return File(about, half, tuple(steps), digests, polyhedra)
 
 
 def problem_of(file: File, number: int) -> Any:
     """The problem of a step, with its contacts and bodies; its description is JSON."""
     step = file.steps[number]
     time, h = float(step.time[0]), float(step.step[0])
+    M, H = step.M, step.H
+    placed = step.place is not None or file.polyhedra is not None
+    if file.polyhedra is not None:
+        M = sp.csc_array(sp.diags_array(file.polyhedra.mass))
+        H = sp.csc_array(_jacobian(step)[np.repeat(file.polyhedra.moves, 6) > 0])
     return _core.GlobalProblem(
         spacedim=3,
-        M=step.M,
-        H=step.H,
+        M=M,
+        H=H,
         f=step.f,
         w=step.w,
         mu=step.mu,
-        contacts=None if step.place is None else _contacts(step),
-        bodies=None if step.place is None else _bodies(step, file.half),
+        contacts=_contacts(step) if placed else None,
+        bodies=_bodies(step, file) if placed else None,
         info=_core.ProblemInfo(
             title=f"t = {time:g} s",
             description=json.dumps({**file.about, "time": time, "time_step": h}),
@@ -150,8 +191,56 @@ def _contacts(step: Step) -> Contacts:
     )
 
 
-def _bodies(step: Step, half: Vector) -> Bodies:
-    """The ground, then the boxes; one shape each."""
+def _jacobian(step: Step) -> Vector:
+    """H (6 nb x 3 nc) of all bodies: the second's velocity less the first's."""
+    second = np.cross(step.normal, step.tangent)
+    frame = np.stack((step.normal, step.tangent, second), axis=1)
+    signs = (-1.0, 1.0)
+    sides = [(step.body[:, side], sign) for side, sign in enumerate(signs)]
+    return jacobian(sides, step.point, frame, step.centre, step.axes)
+
+
+def jacobian(
+    sides: Sequence[tuple[npt.NDArray[np.int64], float]],
+    point: Vector,
+    frame: Vector,
+    centre: Vector,
+    axes: Vector,
+) -> Vector:
+    """H (6 nb x 3 nc) of rigid bodies: velocities of their points, in the frames of contacts.
+
+    A body has the velocity of its centre and its spin about its own axes.
+
+    Args:
+        sides: of each side of the contacts the bodies (nc), and the sign of their velocity.
+        point: (nc x 3).
+        frame: (nc x 3 x 3) rows N, T1, T2.
+        centre: (nb x 3).
+        axes: (nb x 3 x 3) columns.
+    """
+    nc = len(point)
+    H = np.zeros((len(centre), 6, nc, 3))
+    each = np.arange(nc)
+    for body, sign in sides:
+        arm = point - centre[body]
+        moment = np.cross(arm[:, None], frame)  # nc, row, in the world
+        own = axes[body]
+        # in one order everywhere, which a matrix product would not have
+        spin = (
+            moment[:, :, 0, None] * own[:, None, 0]
+            + moment[:, :, 1, None] * own[:, None, 1]
+            + moment[:, :, 2, None] * own[:, None, 2]
+        )
+        H[body, :3, each] += sign * frame.transpose(0, 2, 1)
+        H[body, 3:, each] += sign * spin.transpose(0, 2, 1)
+    return H.reshape(6 * len(centre), 3 * nc)
+
+
+def _bodies(step: Step, file: File) -> Bodies:
+    """The ground, then the boxes; or the polyhedra; one shape each."""
+    if file.polyhedra is not None:
+        return _polyhedra(step, file.polyhedra)
+    half = file.half
     count = len(half)
     kinds = [KINDS.index("plane"), *[KINDS.index("box")] * count]
     return Bodies(
@@ -165,6 +254,30 @@ def _bodies(step: Step, half: Vector) -> Bodies:
         shape_place=np.zeros((1 + count, 3)),
         shape_turn=np.tile(UPRIGHT, (1 + count, 1)),
         shape_mesh=np.full(1 + count, -1, np.int32),
+    )
+
+
+def _polyhedra(step: Step, own: Polyhedra) -> Bodies:
+    """Bodies in the middle of the step, where the engine finds contacts."""
+    count = len(own.moves)
+    ends = [
+        np.cumsum([0, *(len(value) for value in values)]) for values in (own.vertices, own.faces)
+    ]
+    faces = np.concatenate(own.faces)
+    return Bodies(
+        name="\n".join(f"body {i + 1}" for i in range(count)),
+        moves=own.moves.astype(np.int32),
+        place=step.centre,
+        turn=step.turn,
+        shape_body=np.arange(count, dtype=np.int32),
+        shape_kind=np.full(count, KINDS.index("mesh"), np.int32),
+        shape_size=np.zeros((count, 3)),
+        shape_place=np.zeros((count, 3)),
+        shape_turn=np.tile(UPRIGHT, (count, 1)),
+        shape_mesh=np.arange(count, dtype=np.int32),
+        mesh_first=np.column_stack(ends).astype(np.int32),
+        vertex=np.concatenate(own.vertices),
+        face=np.column_stack((faces, np.full(len(faces), -1))).astype(np.int32),
     )
 
 

@@ -30,6 +30,30 @@ class Block:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Quads of a mesh that touch others: their nodes are candidates, or their faces are touched."""
+
+    kind: int  # number of the kind, for the scene's interactions
+    candidate: bool  # whether the nodes of the quads look for faces
+    quads: tuple[tuple[int, ...], ...]  # nodes, in rings about the outward normals
+
+
+@dataclass(frozen=True, kw_only=True)
+class HexMesh:
+    """A homogeneous elastic body of hexahedra of any shape, without stress at its first place."""
+
+    nodes: tuple[Triple, ...]  # [m]
+    elements: tuple[tuple[int, ...], ...]  # 8 nodes each: a lower ring, then the upper one
+    young: float  # Young's modulus [Pa]
+    poisson: float  # Poisson's ratio
+    density: float  # [kg/m^3]
+    lumped: bool = False  # whether the mass is diagonal
+    surfaces: tuple[Surface, ...] = ()
+    displacement: tuple[Triple, ...] = ()  # of the nodes at the start [m]; empty: none
+    velocity: tuple[Triple, ...] = ()  # of the nodes at the start [m/s]; empty: none
+
+
+@dataclass(frozen=True, kw_only=True)
 class Load:
     """A traction on a face of some blocks, that grows evenly from nothing until `rise`.
 
@@ -69,6 +93,8 @@ class Solids:
     The nodes of a block are kept outside the faces of the blocks before it in the list, so the
     lower block comes first. Two faces can touch if they look at each other and are no further apart
     than `reach` at the start.
+
+    Instead of blocks there may be meshes.
     """
 
     blocks: tuple[Block, ...]
@@ -79,8 +105,13 @@ class Solids:
     floor: bool = False
     beds: tuple[Bed, ...] = ()
     loads: tuple[Load, ...] = ()
+    # meshes have no floor, beds and loads; they touch by the interactions of the scene, and each
+    # has its friction
+    meshes: tuple[HexMesh, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.meshes and (self.blocks or self.beds or self.loads or self.floor):
+            raise ValueError("meshes have no blocks, beds, loads and floor beside them")
         for i, block in enumerate(self.blocks):
             if min(block.size) <= 0 or min(block.elements) < 1:
                 raise ValueError(f"block {i}: its edges must be > 0 and have at least 1 element")

@@ -1,7 +1,7 @@
 // jammed.cpp: spheres of radii that differ, in a cube, compressed through jamming.
 //
-//     c++ -O2 -std=c++20 -ffp-contract=off -o jammed workshop/sets/jammed.cpp && ./jammed COUNT SEED
-//     OVERLAP
+//     c++ -O2 -std=c++20 -ffp-contract=off -o jammed workshop/sets/jammed.cpp && ./jammed COUNT
+//     SEED OVERLAP
 //
 // The spheres repel each other and the walls by k times their overlap. Their radii grow in steps;
 // after each the energy is minimised (FIRE, E. Bitzek et al., Physical Review Letters 97, 2006).

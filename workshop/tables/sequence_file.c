@@ -1,4 +1,5 @@
-/* Records steps of 17 contacts between two bodies from C: "WAY CPU_SECONDS_A_STEP BYTES_A_STEP" a line.
+/* Records steps of 17 contacts between two bodies from C: "WAY CPU_SECONDS_A_STEP BYTES_A_STEP" a
+ * line.
  *
  *   sequence_file FOLDER STEPS PLAIN
  *

@@ -117,7 +117,7 @@ def shoot(shot: Shot, path: Path) -> None:
     seen = family().scene(states.scene.seed)
     model = simulate.model_of(replace(states.scene, view=seen.view, focus=seen.focus))
     place = range(len(states.number))[shot.number]
-    part = states.problem(place)
+    part: Any = states.problem(place)
     if not shot.forces:
         model.set_state(states.position[place], states.velocity[place])
         simulate.render(model, path, size=shot.size)

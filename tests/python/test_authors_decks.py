@@ -32,7 +32,7 @@ def matrix(turn: Any) -> Any:
 def rebuilt(problem: Any) -> Any:
     """H from /bodies and /contacts: a moving body has six columns, spins are about its axes."""
     contacts, bodies = problem.contacts, problem.bodies
-    place = {body: 6 * k for k, body in enumerate(np.flatnonzero(bodies.moves))}
+    place = {int(body): 6 * k for k, body in enumerate(np.flatnonzero(bodies.moves))}
     H = np.zeros((6 * len(place), 3 * problem.nc))
     for c, frame in enumerate(contacts.frame):
         for body, sign in zip(contacts.body[c], (-1, 1), strict=True):
@@ -52,7 +52,7 @@ def small(name: str, steps: int, begin: int = 0) -> list[Any]:
     pytest.importorskip("mujoco")
     from fclib.simulate import geometry_of, problem_at, scheme_of, simulate
 
-    family = scenes.get(name)
+    family: Any = scenes.get(name)
     scene = family(**family.small).scene(0)
     found = []
     for step in simulate(scene, begin + steps, tol=1e-10):
@@ -80,7 +80,7 @@ def test_rigid_problems_are_rebuilt_from_their_tables(name: str, begin: int) -> 
 
 
 def test_the_bridge_is_that_of_the_engine() -> None:
-    family = scenes.assemblies()["LMGC90Bridge"]
+    family: Any = scenes.assemblies()["LMGC90Bridge"]
     assert family.problems == len(family.digests()) == len(set(family.digests())) == 50
     file = family.file()
     assert file.about["engine"]["name"] == "LMGC90"
@@ -105,7 +105,8 @@ def test_the_bodies_of_the_bridge_have_the_density_of_the_deck() -> None:
     """1,840 or 4,400 kg/m^3, from the volumes of the stored polyhedra."""
     from fclib.scenes.shared import polyhedron
 
-    own = scenes.assemblies()["LMGC90Bridge"].file().polyhedra
+    family: Any = scenes.assemblies()["LMGC90Bridge"]
+    own = family.file().polyhedra
     moving = np.flatnonzero(own.moves)
     for k, body in enumerate(moving):
         vertices, faces = own.vertices[body], own.faces[body].astype(np.int64)
@@ -127,6 +128,7 @@ def test_sizes_are_those_of_the_decks() -> None:
     assert len([drive for drive in cell.drives if drive.velocity]) == 6
     for name, nodes, foot in (("ElasticCubesx2", 27, 9), ("ElasticCubes", 216, 36)):
         cubes = scenes.get(name)().scene(0)
+        assert cubes.solids is not None
         assert [len(mesh.nodes) for mesh in cubes.solids.meshes] == [nodes, nodes]
         assert len(cubes.drives) == 3 * foot
 

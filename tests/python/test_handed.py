@@ -22,7 +22,7 @@ from fclib.external import siconos
 from fclib.recorders import _siconos
 from fclib.scenes import Scene
 from helpers import dense
-from workshop.sets import rt444_states
+from workshop.sets import _rt444_scenes, rt444_states
 
 H, THETA, GRAVITY, MU = 1e-3, 0.6, 9.81, 0.4
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -80,7 +80,7 @@ def some_states(count: int, seed: int = 0) -> tuple[Any, Any, handed.Handed]:
 def states_of(count: int = 5, version: str = "1") -> trajectory.Trajectory:
     """The same as a trajectory, rounded."""
     position, velocity, contacts = some_states(count)
-    rounded = {
+    rounded: dict[str, Any] = {
         name: trajectory.rounded(getattr(contacts, name), -30) for name in trajectory.NUMBERS
     }
     made = trajectory.Trajectory(
@@ -360,14 +360,14 @@ def test_words_of_a_problem_name_authors_engine_and_choice() -> None:
 
 def test_scenes_are_those_of_the_authors_files() -> None:
     """Facts of their scripts: numbers of bodies, first and last places, sizes."""
-    scenes = rt444_states.SCENES
+    scenes = _rt444_scenes.SCENES
     boxes, planks, capsules = (
         [body for body in scenes[name].bodies() if body.mass]
         for name in ("BoxesStack", "KaplasTower", "Capsules")
     )
-    assert (len(boxes), len(planks), len(capsules)) == (50, 132, 100)
-    assert boxes[-1].place == (0, 0, 300)
-    assert capsules[-1].place == (0, 0, 614)
+    assert [len(some) for some in (boxes, planks, capsules)] == [50, 132, 100]
+    assert list(boxes[-1].place) == [0, 0, 300]
+    assert list(capsules[-1].place) == [0, 0, 614]
     np.testing.assert_allclose(planks[-1].place, (20.3342764809, -11.74, 36.66), atol=1e-9)
     assert {body.mass for body in (*boxes, *planks, *capsules)} == {1.0}
     # a plank lies along its ring, and stands on its edge
@@ -379,7 +379,7 @@ def test_scenes_are_those_of_the_authors_files() -> None:
 
 
 def test_inertia_of_a_capsule_is_that_of_its_points() -> None:
-    body = next(body for body in rt444_states.SCENES["Capsules"].bodies() if body.mass)
+    body = next(body for body in _rt444_scenes.SCENES["Capsules"].bodies() if body.mass)
     radius, height = body.sizes
     axis = np.linspace(-radius - height / 2, radius + height / 2, 161)
     side = np.linspace(-radius, radius, 81)
@@ -398,7 +398,7 @@ def written(
     folder: Path, number: int, shift: float, first: int = 0, order: Any = (0, 1, 2, 3)
 ) -> Path:
     """A recorded step of the stack: its lowest box on four points, so far beside its middle."""
-    bodies = [body for body in rt444_states.SCENES["BoxesStack"].bodies() if body.mass]
+    bodies = [body for body in _rt444_scenes.SCENES["BoxesStack"].bodies() if body.mass]
     position = np.array([[i + 1, *body.place, *body.turn] for i, body in enumerate(bodies)])
     position[0, [1, 3]] = shift, 1.0
     velocity = np.column_stack((position[:, 0], np.zeros((len(bodies), 6))))
@@ -407,8 +407,8 @@ def written(
     rows[:, 1:4], rows[:, 4:7], rows[:, 9] = corners, corners, 1
     rows[:, 22], rows[:, 23], rows[:, 24] = order, 1, 1
     mass = np.array([np.diag([1.0] * 3 + [2 / 3] * 3)] * len(bodies))
-    h = rt444_states.SCENES["BoxesStack"].step
-    known = {
+    h = _rt444_scenes.SCENES["BoxesStack"].step
+    known: dict[str, Any] = {
         "points": rows,
         "positions": position,
         "velocities": velocity,

@@ -106,7 +106,7 @@ def test_the_jacobian_is_that_of_rigid_bodies() -> None:
     ],
 )
 def test_what_the_engine_does_not_take_is_named(
-    tmp_path: Path, change: dict[str, str], message: str
+    tmp_path: Path, change: dict[str, Any], message: str
 ) -> None:
     path = write.blocks(tmp_path, **change)
     with pytest.raises(ValueError, match=message):
@@ -186,6 +186,7 @@ def test_the_engines_reaction_gives_its_velocity(tmp_path: Path, theta: float) -
     assert fclib.merit(last.problem, last.guess).error < 1e-6
     ours = fclib.solve(last.problem, tol=1e-10)
     assert ours.converged
+    assert ours.solution.v is not None
     np.testing.assert_allclose(ours.solution.v, last.velocity, atol=1e-7)
 
 
@@ -253,7 +254,8 @@ def test_both_ways_agree(tmp_path: Path) -> None:
         assert gap == pytest.approx(found.gap[k], abs=1e-6)
     assert len(used) == 9
     # and the same motion, up to the engine's gaps: of 1e-9 m, closed in a step
-    own = fclib.solve(theirs.problem, tol=1e-10).solution.v.reshape(-1, 6)[:, :3]
+    v: Any = fclib.solve(theirs.problem, tol=1e-10).solution.v
+    own = v.reshape(-1, 6)[:, :3]
     np.testing.assert_allclose(own, ours.velocity.reshape(-1, 6)[:, :3], atol=1e-6)
 
 

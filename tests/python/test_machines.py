@@ -72,7 +72,7 @@ def test_stored_states_have_contacts_and_no_deep_ones(name: str) -> None:
         states = collections.read_trajectory(path)
         size: Any = states.model.smallest_size
         for place in range(0, len(states), 3):
-            step = states.problem(place)
+            step: Any = states.problem(place)
             assert step.problem.nc
             assert -step.contacts.gap.min() < DEEPEST * 2 * size
         # the plan takes those that are stored, and no others

@@ -143,7 +143,8 @@ def test_states_are_relaxed_before_they_are_stored(tmp_path: Path) -> None:
         collections.record(plan, target, tmp_path / "checkpoint.npz")
         states = trajectory.read(target)
         assert states.origin["settings"].get("deepest") == deepest
-        return [-float(states.problem(k).contacts.gap.min()) / 0.2 for k in range(len(states))]
+        parts: list[Any] = [states.problem(k) for k in range(len(states))]
+        return [-float(part.contacts.gap.min()) / 0.2 for part in parts]
 
     fallen = depths(None)
     assert max(fallen) > 2 * BOUND

@@ -610,7 +610,7 @@ def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
     dofs, contacts, thickness = RANGES[name]
     limit = 0.02 * thickness(states.scene.parameters)
     for place in np.linspace(0, len(states) - 1, 60).astype(int).tolist():
-        part = states.problem(place)
+        part: Any = states.problem(place)
         assert dofs[0] <= part.problem.n <= dofs[1]
         assert contacts[0] <= part.problem.nc <= contacts[1]
         gap = (part.problem if states.handed is not None else part).contacts.gap

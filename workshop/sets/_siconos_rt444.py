@@ -21,7 +21,7 @@ import numpy as np
 import siconos.io.mechanics_run as mechanics_run
 import siconos.kernel as kernel
 import siconos.numerics as numerics
-from _rt444_scenes import SCENES, Body
+from _rt444_scenes import SCENES, Body  # type: ignore[import-not-found]
 from siconos.mechanics.collision.tools import Contactor
 
 TOLERANCE = 1e-8

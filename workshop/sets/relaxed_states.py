@@ -55,7 +55,8 @@ def mended(states: trajectory.Trajectory, version: str) -> trajectory.Trajectory
     model, scheme = states.model, states.scheme
     position = states.position.copy()
     for k in range(len(states)):
-        if depth(states, states.problem(k).contacts) > DEEPEST:
+        part: Any = states.problem(k)
+        if depth(states, part.contacts) > DEEPEST:
             found = relaxed(model, scheme, position[k], states.velocity[k], DEEPEST)
             position[k] = trajectory.rounded(found, states.exponent)
     if np.array_equal(position, states.position):
@@ -142,7 +143,8 @@ def compared(folder: str) -> dict[str, Any] | None:
     for k in range(len(new)):
         if new.digest[k] == old.digest[k]:
             continue
-        parts = [each.problem(k).contacts for each in (old, new)]
+        steps: list[Any] = [each.problem(k) for each in (old, new)]
+        parts = [step.contacts for step in steps]
         touching = [{tuple(pair) for pair in part.pair.tolist()} for part in parts]
         states += 1
         for side, part in enumerate(parts):

@@ -226,6 +226,45 @@ bool is_locked(const std::string& path) {
   return file.id() >= 0 && ::flock(file.id(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
+std::string name_beside(const std::string& path) { return path + "." + std::to_string(::getpid()); }
+
+WriterLock::WriterLock(std::string path)
+    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDWR | O_CLOEXEC)) {
+  if (file_ < 0) fail_in_system();
+#ifdef F_OFD_SETLK
+  struct flock whole{};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  if (::fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES)) {
+    ::close(file_);
+    fail(path_, "another writer has it open");
+  }
+#endif
+}
+
+WriterLock::~WriterLock() { ::close(file_); }
+
+bool WriterLock::reserve(std::uint64_t end, std::uint64_t bytes) const {
+#ifdef FALLOC_FL_KEEP_SIZE
+  return ::fallocate(file_, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(end),
+                     static_cast<off_t>(bytes)) == 0 ||
+         (errno != ENOSPC && errno != EDQUOT && errno != EFBIG);
+#else
+  static_cast<void>(end), static_cast<void>(bytes);
+  return true;
+#endif
+}
+
+void WriterLock::fail_in_system() const { fclib::fail_in_system(path_, "cannot be written"); }
+
+void WriterLock::finish() const {
+  struct stat status{};
+  if (::fstat(file_, &status) != 0 || ::ftruncate(file_, status.st_size) != 0 ||
+      ::fsync(file_) != 0) {
+    fail_in_system();
+  }
+}
+
 void replace_file(const std::string& path, std::string_view bytes) {
   replace_file(path, Pieces(&bytes, 1));
 }

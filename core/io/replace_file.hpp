@@ -2,6 +2,7 @@
 // half a file behind. All of core/ that calls POSIX for files is here.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -36,6 +37,31 @@ void replace_file(const std::string& path, std::string_view bytes);
 /// flushed: until sync_files() is called, a crash of the machine may lose it.
 void replace_file(const std::string& path, std::span<const std::string_view> pieces,
                   bool sync = true);
+
+/// The name of a new file beside this one, which no other process makes.
+std::string name_beside(const std::string& path);
+
+/// Makes sure that one program writes to a growing file at a time. The lock ends with the process.
+/// HDF5 itself locks files in another way, which keeps readers out. Throws Error (file) that names
+/// the file.
+class WriterLock {
+ public:
+  explicit WriterLock(std::string path);
+  ~WriterLock();
+  WriterLock(const WriterLock&) = delete;
+  WriterLock& operator=(const WriterLock&) = delete;
+
+  /// Takes room behind the end of the file, and returns whether there is.
+  [[nodiscard]] bool reserve(std::uint64_t end, std::uint64_t bytes) const;
+  /// Throws with the reason that the system gave last.
+  [[noreturn]] void fail_in_system() const;
+  /// Gives back what room is left, and waits for the disk.
+  void finish() const;
+
+ private:
+  std::string path_;
+  int file_ = -1;
+};
 
 /// Flushes all files on the file system of this folder.
 void sync_files(const std::string& folder);

@@ -1,9 +1,5 @@
 #include "io/hdf5/sequence.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -103,7 +99,7 @@ void create_parts(const Group& root, int compression) {
 /// killed meanwhile leaves the old file, and the new one beside it.
 template <class Fill>
 void replace_sequence(const std::string& path, const Fill& fill) {
-  const std::string beside = path + "." + std::to_string(::getpid());
+  const std::string beside = name_beside(path);
   try {
     {
       const Handle access = access_of_sequence();
@@ -125,55 +121,6 @@ void replace_sequence(const std::string& path, const Fill& fill) {
     throw;
   }
 }
-
-/// Makes sure that one program writes to a file at a time. The lock ends with the process. HDF5
-/// itself locks files in another way, which keeps readers out.
-class WriterLock {
- public:
-  explicit WriterLock(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CLOEXEC)) {
-    if (file_ < 0) fail_in_system();
-#ifdef F_OFD_SETLK
-    struct flock whole{};
-    whole.l_type = F_WRLCK;
-    whole.l_whence = SEEK_SET;
-    if (::fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES)) {
-      ::close(file_);
-      fail("", "another writer has it open");
-    }
-#endif
-  }
-  ~WriterLock() { ::close(file_); }
-  WriterLock(const WriterLock&) = delete;
-  WriterLock& operator=(const WriterLock&) = delete;
-
-  /// Takes room behind the end of the file, and returns whether there is.
-  [[nodiscard]] bool reserve(std::uint64_t end, std::uint64_t bytes) const {
-#ifdef FALLOC_FL_KEEP_SIZE
-    return ::fallocate(file_, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(end),
-                       static_cast<off_t>(bytes)) == 0 ||
-           (errno != ENOSPC && errno != EDQUOT && errno != EFBIG);
-#else
-    static_cast<void>(end), static_cast<void>(bytes);
-    return true;
-#endif
-  }
-
-  [[noreturn]] static void fail_in_system() {
-    fail("", std::string("cannot be written: ") + std::strerror(errno));
-  }
-
-  /// Gives back what room is left, and waits for the disk.
-  void finish() const {
-    struct stat status{};
-    if (::fstat(file_, &status) != 0 || ::ftruncate(file_, status.st_size) != 0 ||
-        ::fsync(file_) != 0) {
-      fail_in_system();
-    }
-  }
-
- private:
-  int file_;
-};
 
 bool is_sequence(const std::string& path) {
   const Handle file = open_file(path);

@@ -74,7 +74,7 @@ class Imported(Mapping[str, Any]):
 
 
 class Commands(TyperGroup):
-    """The commands, with a help that fits a screen: options for shells are left out."""
+    """The commands, with a help that fits a screen."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -96,19 +96,16 @@ class Commands(TyperGroup):
             except KeyboardInterrupt:
                 interrupted()
 
-    def get_params(self, ctx: Any) -> list[Any]:
-        """The options, those of completion hidden."""
-        params: list[Any] = super().get_params(ctx)
-        for param in params:
-            if param.name in ("install_completion", "show_completion"):
-                param.hidden = True
-        return params
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """The commands alone: the text above them names the options."""
+        self.format_commands(ctx, formatter)
 
 
 app = typer.Typer(
     name="fclib",
     cls=Commands,
-    help="Frictional contact problems, and a test bench for the solvers of them.",
+    help="Frictional contact problems, and a test bench for the solvers of them. COMMAND --help shows"
+    " the options of a command, --version the version.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in which a command is a line, and all of them a screen

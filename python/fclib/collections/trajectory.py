@@ -247,7 +247,7 @@ def write(path: Path, trajectory: Trajectory) -> None:
         for name in INTEGERS:
             arrays[name] = getattr(trajectory.handed, name).astype("<i4").tobytes()
     for name, values, order in columns:
-        values = values.reshape(len(values), -1)
+        values = values.reshape(len(values), math.prod(values.shape[1:]))
         arrays[name], width = packed(values, trajectory.exponent, order)
         shapes[name] = {"shape": list(values.shape), "bytes": width}
     arrays["number"] = trajectory.number.astype("<i8").tobytes()

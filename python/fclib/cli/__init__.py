@@ -96,16 +96,19 @@ class Commands(TyperGroup):
             except KeyboardInterrupt:
                 interrupted()
 
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """The commands alone: the text above them names the options."""
-        self.format_commands(ctx, formatter)
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options, all hidden: the text of the help names those that matter."""
+        params: list[Any] = super().get_params(ctx)
+        for param in params:
+            param.hidden = True
+        return params
 
 
 app = typer.Typer(
     name="fclib",
     cls=Commands,
-    help="Frictional contact problems, and a test bench for the solvers of them. COMMAND --help shows"
-    " the options of a command, --version the version.",
+    help="Frictional contact problems, and a test bench for the solvers of them. COMMAND --help"
+    " shows the options of a command, --version the version.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # plain help, in which a command is a line, and all of them a screen

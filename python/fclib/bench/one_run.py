@@ -9,6 +9,8 @@ from typing import Any
 
 from fclib import _core, _solve
 
+LONGEST = 60  # characters of an option that a table shows
+
 
 @dataclass(frozen=True)
 class Run:
@@ -81,7 +83,7 @@ def run(
     status = result.status
     if status == "converged" and not error <= tol:
         status = "inaccurate"
-    label = " ".join([solver, *(f"{key}={value}" for key, value in options.items())])
+    label = " ".join([solver, *(f"{key}={shown(value)}" for key, value in options.items())])
     return Run(
         problem=name,
         formulation=problem.formulation,
@@ -96,3 +98,9 @@ def run(
         scaled_natural=judged.scaled_natural,
         result=result,
     )
+
+
+def shown(value: Any) -> str:
+    """An option in a table: of a text of several lines, as a chain, the first one."""
+    first, *others = str(value).strip().splitlines() or [""]
+    return f"{first[:LONGEST]}..." if others or len(first) > LONGEST else first

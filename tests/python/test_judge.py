@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -84,8 +86,8 @@ def test_what_cannot_be_judged_is_named(tmp_path: Path) -> None:
         list(recorders.judge([tmp_path / "one.hdf5"]))
     for words, status, said in (
         ([str(tmp_path)], 1, "has no guess"),
-        (["mujocoo", "script.py"], 1, "mujocoo"),
-        ([str(tmp_path / "none")], 1, "neither a folder nor an engine"),
+        (["mujocoo", "script.py"], 2, "mujocoo: is neither a folder nor an engine"),
+        ([str(tmp_path / "none")], 1, "neither a folder, a file nor an engine"),
         (["mujoco"], 2, "name a script"),
         (["mujoco", str(tmp_path / "none.py")], 1, "there is no such script"),
     ):
@@ -136,3 +138,24 @@ def test_a_script_is_judged(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "slide" in done.output
     assert "dissipation" in done.output
+
+
+def test_a_sequence_is_judged_as_its_steps(tmp_path: Path) -> None:
+    with fclib.SequenceWriter(tmp_path / "run.h5") as writer:
+        for _ in range(3):
+            writer.append(block(), guesses=[fclib.Solution(r=RIGHT)])
+    for what, count in ((tmp_path / "run.h5", 3), (tmp_path, 3), (f"{tmp_path}/run.h5#1", 1)):
+        done = CliRunner().invoke(app, ["judge", str(what), "--json"])
+        assert done.exit_code == 0, done.output
+        assert len(done.output.splitlines()) == count
+
+
+def test_a_bad_guess_names_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "step.hdf5"
+    fclib.write(path, block(), None, [fclib.Solution(r=RIGHT)])
+    with h5py.File(path, "r+") as file:
+        for name in ("guesses/1/r", "guesses/1/reaction"):
+            if name in file:
+                file[name][0] = np.nan
+    with pytest.raises(fclib.FileError, match=re.escape(str(path))):
+        list(recorders.judge([path]))

@@ -107,7 +107,7 @@ def test_what_is_packed_comes_back(tmp_path: Path) -> None:
     ):
         assert back.add_rows(results.rows_of(part), own.machines) == 16
         assert back.add_rows(results.rows_of(part), own.machines) == 0
-        hidden = {"run", "campaign", "machine", "node"}
+        hidden = {"run", "campaign", "machine", "node", "message"}
         first, second = (
             sorted(
                 json.dumps({k: v for k, v in row.items() if k not in hidden}, sort_keys=True)
@@ -164,6 +164,44 @@ def test_rows_that_contradict_themselves_are_found(tmp_path: Path) -> None:
     said = "\n".join(results.verify(wrong))
     for word in ("row 0: is converged", "row 1: has the status", "row 2: cpu_s", "there twice"):
         assert word in said
+
+
+@pytest.mark.parametrize("name", ["tol", "solver", "status", "hash", "history", "cpu_s"])
+def test_a_part_without_a_column_is_none(name: str, tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    part = packed(tmp_path)
+    table = pq.read_table(part)
+    other = tmp_path / part.name
+    pq.write_table(table.drop_columns([name]), other)
+    mine = store(tmp_path / "mine.sqlite", facts("mine", 1.0), ["ppa-nsn"])
+    for call in (results.verify, lambda path: list(results.shards(path.parent))):
+        with pytest.raises(results.ShardError, match=f"no column '{name}'"):
+            call(other)
+    with pytest.raises(results.ShardError, match="no column"), results.beside(mine, [other]):
+        pass
+    place = table.column_names.index(name)
+    pq.write_table(table.set_column(place, name, [[[1]] * len(table)]), other)
+    with pytest.raises(results.ShardError, match=f"column '{name}': is of type"):
+        results.verify(other)
+    if name in ("tol", "solver", "status", "hash"):
+        kind = table.schema.field(name)
+        nothing = pa.array([None] * len(table), kind.type)
+        rows = table.set_column(place, kind, nothing)
+        pq.write_table(rows.replace_schema_metadata(table.schema.metadata), other)
+        assert f"row 0: has no {name}" in results.verify(other)
+
+
+def test_programs_are_published_without_their_folders(tmp_path: Path) -> None:
+    from fclib.results.shards import public_name
+
+    assert public_name("cmd:/home/me/secret/solve --fast {input}") == "cmd:solve"
+    assert public_name("plugin:/home/me/libx.so") == "plugin:libx.so"
+    assert public_name("siconos:nsgs") == "siconos:nsgs"
+    packed(tmp_path)
+    (own,) = results.shards(tmp_path / "parts")
+    assert all("text" not in one for one in own.campaigns)
 
 
 # ---- beside

@@ -1001,3 +1001,76 @@ def test_what_is_not_recorded_of_mujoco_is_named() -> None:
     with pytest.raises(ValueError, match="mjINT_RK4 is not recorded"):
         recorders.mujoco(model, data)
     assert data.time == 0
+
+
+@pytest.mark.parametrize(
+    ("option", "joint", "exact"),
+    [
+        ("", 'damping="2"', True),
+        ('<flag damper="disable"/>', 'damping="2"', True),
+        ('<flag eulerdamp="disable"/>', 'damping="2"', True),
+        ("", 'damping="2 3 .5"', False),
+    ],
+)
+def test_what_mujocos_reaction_does_not_explain_is_said(
+    option: str, joint: str, exact: bool
+) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><option>{option}</option><worldbody><body>"
+        f"<joint type='hinge' axis='0 1 0' {joint}/>"
+        "<geom type='capsule' size='.05' fromto='0 0 0 1 0 0'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    data.qvel[0] = 3
+    for _ in range(20):
+        step = recorders.mujoco(model, data)
+        assert step.mismatch is not None
+        assert (step.mismatch < 1e-12) is exact
+        assert step.fields["M"] == ("exact" if exact else "reconstructed")
+        assert any("next velocity" in note for note in step.notes) is not exact
+
+
+def test_sleeping_bodies_of_mujoco_are_refused() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><option><flag sleep='enable'/></option><worldbody><body><freejoint/>"
+        "<geom size='.1'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(ValueError, match="bodies that sleep"):
+        recorders.mujoco(model, mujoco.MjData(model))
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "said"),
+    [
+        ("import sys\nstep(3)\nsys.exit(0)\n", 0, "3 of 3 steps"),
+        ("import sys\nstep(3)\nsys.exit(4)\n", 1, "ended with 4"),
+        ("step(1)\nraise ValueError('mine')\n", 1, "script.py:8: ValueError: mine"),
+        ("import nosuchmodule\n", 1, "script.py:7: ModuleNotFoundError"),
+        ("def f(:\n", 1, "script.py:7: SyntaxError"),
+        ("\0", 1, "script.py"),
+        ("pass\n", 0, "it took no step of mujoco"),
+        ("import os\nos.chdir('/')\nstep(2)\n", 0, "2 of 2 steps"),
+        ("mujoco.mj_step(m=model, d=data, nstep=4)\n", 0, "4 of 4 steps"),
+    ],
+)
+def test_scripts_end_as_they_like(
+    text: str, status: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import mujoco\n"
+        "model = mujoco.MjModel.from_xml_string(\n"
+        "    \"<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .099'>\"\n"
+        "    \"<freejoint/><geom size='.1'/></body></worldbody></mujoco>\")\n"
+        "data = mujoco.MjData(model)\n"
+        "step = lambda n: mujoco.mj_step(model, data, n)\n" + text
+    )
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["record", "mujoco", "script.py", "--out", "out"])
+    assert done.exit_code == status, done.output
+    assert said in " ".join(done.output.split())
+    if said.endswith("steps"):
+        assert len(list((tmp_path / "out").glob("*.hdf5"))) == int(said[0])

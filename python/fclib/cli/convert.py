@@ -221,6 +221,11 @@ def targets_of(
     if len(files) != 2:
         raise ValueError("give an input and an output, or inputs and --out FOLDER")
     source, target = files
+    if (steps := steps_of(source)) != [source]:
+        raise ValueError(
+            f"{source} is a sequence of {len(steps)} steps: name one of them, as {source}#0, or a"
+            " folder for all by --out"
+        )
     if target.is_dir():
         raise ValueError(f"{target} is a folder, give it with --out")
     output = output or EXTENSIONS.get(target.suffix.lower())

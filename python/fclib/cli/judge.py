@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
-from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error
+from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, steps_of, usage_error
 
 SUFFIXES = (".hdf5", ".h5")
 
@@ -43,15 +43,22 @@ def command(
     """
     from fclib import recorders
 
+    engines = ", ".join(recorders.ENGINES)
+    if len(what) > 1 and what[0] not in recorders.ENGINES and not Path(what[0]).exists():
+        usage_error(ValueError(f"{what[0]}: is neither a folder nor an engine: {engines}"))
     if what[0] in recorders.ENGINES:
         if len(what) < 2:
             usage_error(ValueError(f"{what[0]}: name a script: fclib judge {what[0]} SCRIPT"))
         with tempfile.TemporaryDirectory(prefix="fclib-judge-") as temporary:
             folder = Path(temporary) / "steps"
             try:
-                recorders.record_script(what[0], what[1], folder, every=every, arguments=what[2:])
+                recording = recorders.record_script(
+                    what[0], what[1], folder, every=every, arguments=what[2:]
+                )
             except (ImportError, OSError, ValueError) as error:
                 fail(str(error))
+            if not recording.written:
+                fail(f"{what[1]}: {recording.nothing(what[0])}")
             runs = judged({Path(what[1]).stem: folder})
     else:
         runs = judged({one.rstrip("/"): Path(one) for one in what})
@@ -90,11 +97,11 @@ def judged(folders: dict[str, Path]) -> dict[str, Sequence[Any]]:
 
     runs: dict[str, Sequence[Any]] = {}
     for name, folder in folders.items():
-        if not folder.exists() and len(folders) == 1 and folder.suffix == "":
+        if not name or not (folder.exists() or "#" in name):
             known = ", ".join(recorders.ENGINES)
-            fail(f"{folder}: is neither a folder nor an engine; there is: {known}")
-        files = [folder] if folder.is_file() else []
-        files = files or sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES)
+            fail(f"{name!r}: is neither a folder, a file nor an engine; there is: {known}")
+        found = sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES)
+        files = [step for one in found or [folder] if not one.is_dir() for step in steps_of(one)]
         if not files:
             fail(f"{name}: there is no step with contacts")
         steps = []

@@ -64,6 +64,4 @@ def command(
         fail(str(error))
     out.print(f"{recording.written} of {recording.seen} steps, in {folder}", highlight=False)
     if not recording.written:
-        err.print(
-            f"No step of {engine} that was kept has a contact between points", highlight=False
-        )
+        err.print(f"{script}: {recording.nothing(engine)}", highlight=False)

@@ -117,7 +117,7 @@ def pack(
 ) -> None:
     """Write the runs of a store that no part has yet as a new part.
 
-    The host name and the paths of the machine stay private.
+    The host name, messages, and the texts of campaigns stay private: they may name paths.
     """
     try:
         with bench.Store(store, create=False) as opened:

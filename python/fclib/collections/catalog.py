@@ -266,7 +266,7 @@ def where(table: Any, condition: str) -> Any:
     try:
         asked = truth(ast.parse(condition.strip(), mode="eval").body)
         return table.filter(asked)
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+    except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         if isinstance(error, ConditionError):
             raise
         reason = str(error).splitlines()[0] if str(error) else "too long"

@@ -111,9 +111,13 @@ def judge(paths: Sequence[Path], *, tolerance: float = 1e-8) -> Iterator[Judgeme
         guesses = _core.read_guesses(path)
         if not guesses:
             raise _core.FileError(f"{path}: has no guess, which would be the simulator's reaction")
+        try:
+            found = criteria_of(problem, guesses[0])
+        except (_core.Error, ValueError) as error:
+            raise _core.FileError(f"{path}: its first guess: {error}") from None
         origin = origin_of(problem.info)
         result = _solve.solve(problem, tol=tolerance)
-        found = _core.merit(problem, result.solution)
+        reached = _core.merit(problem, result.solution).error
         own = origin.get("engine", path.parent.name)
         if origin.get("generator") == "fclib.simulate":
             own = "FCLIB"
@@ -122,9 +126,9 @@ def judge(paths: Sequence[Path], *, tolerance: float = 1e-8) -> Iterator[Judgeme
             file=str(path),
             time=time_of(origin, path),
             contacts=problem.nc,
-            **criteria_of(problem, guesses[0]),
+            **found,
             auto_status=str(result.status),
-            auto_error=found.error,
+            auto_error=reached,
             auto_cpu=result.cpu_s,
         )
 

@@ -123,7 +123,8 @@ class Recording:
         """ValueError if `every` is below 1, FileExistsError if there are files already."""
         if every < 1:
             raise ValueError(f"every must be at least 1, not {every}")
-        self.folder, self.every = Path(folder), every
+        # a script may change to another folder
+        self.folder, self.every = Path(folder).absolute(), every
         self.seen = self.written = 0
         if self.folder.is_dir() and any(self.folder.glob("*.hdf5")):
             raise FileExistsError(f"{self.folder}: has files already; name another folder")
@@ -133,6 +134,12 @@ class Recording:
 
     def __exit__(self, *_: object) -> None:
         return None
+
+    def nothing(self, engine: str) -> str:
+        """Why no step was written, in words."""
+        if not self.seen:
+            return f"it took no step of {engine} of the kind that is recorded"
+        return f"of {self.seen} steps, none that was kept has a contact between points"
 
     @property
     def wanted(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import runpy
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,13 +44,13 @@ def _steps_of_mujoco(recording: Recording) -> Iterator[None]:
     mj: Any = importlib.import_module("mujoco")
     original = mj.mj_step
 
-    def step(model: Any, data: Any, nstep: int = 1) -> None:
+    def step(m: Any, d: Any, nstep: int = 1) -> None:
         for _ in range(nstep):
             if recording.wanted:
-                recording.add(_mujoco.record(mj, model, data, original))
+                recording.add(_mujoco.record(mj, m, d, original))
             else:
                 recording.add(None)
-                original(model, data)
+                original(m, d)
 
     mj.mj_step = step
     try:
@@ -122,16 +123,32 @@ def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequ
         try:
             with steps(recording):
                 runpy.run_path(str(script), run_name="__main__")
-        except ModuleNotFoundError as error:
-            if error.name != module:
-                raise
-            raise ImportError(
-                f"{module} is not installed; install it with: pip install 'fclib[recorders]'"
-            ) from None
+        except SystemExit as end:
+            if end.code not in (None, 0):
+                raise ValueError(f"{script}: ended with {end.code}") from None
+        except Exception as error:
+            if isinstance(error, ModuleNotFoundError) and error.name == module:
+                raise ImportError(
+                    f"{module} is not installed; install it with: pip install 'fclib[recorders]'"
+                ) from None
+            kind = type(error).__name__
+            raise ValueError(f"{script}{_line_of(error, script)}: {kind}: {error}") from error
         finally:
             sys.argv, sys.path[:] = before, path
 
     return run
+
+
+def _line_of(error: Exception, script: Path) -> str:
+    """The last line of a script that an error passed, as ":12"; empty if it passed none."""
+    if isinstance(error, SyntaxError):
+        return f":{error.lineno}" if error.lineno else ""
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == str(script)
+    ]
+    return f":{lines[-1]}" if lines else ""
 
 
 ENGINES: Final[dict[str, Callable[..., None]]] = {

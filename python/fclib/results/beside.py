@@ -76,7 +76,8 @@ def beside(
                 taken += joined.add_rows(rows, {node: facts})
         if not taken:
             raise BesideError(
-                f"{mine}: no published run has a problem, tolerance and limits of this store"
+                f"{mine}: there is no published run of its problems, tolerances and limits that it"
+                " does not have itself"
             )
         yield Joined(path, taken, {k: v for k, v in ratios.items() if v.mean != 1})
 

@@ -2,7 +2,7 @@
 
 It is a Parquet file with a row for each run and the columns of a store's `results`, so that any
 program reads it. Paths of the machine, and solutions, stay out of it. Its metadata have the facts
-of the machines, with their calibrations, and the texts of the campaigns.
+of the machines, with their calibrations, and the names of the campaigns.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Final
 
 from fclib import _core
 from fclib._verdicts import is_solved
-from fclib.bench.layout import CAMPAIGN, HISTORY
+from fclib.bench.layout import CAMPAIGN, HISTORY, columns
 from fclib.bench.store import LONG, Store
 from fclib.bench.table import TEXTS, WHOLE
 from fclib.collections.catalog import arrow, replace_file, sha256
@@ -30,8 +30,10 @@ ABOUT: Final = b"fclib.results"  # key of the metadata
 VERSION: Final = 1
 DIGITS: Final = 16  # digits of the file's SHA-256 in its name
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+# columns that each run has
+NEEDED: Final = ("key", "problem", "hash", "solver", "tol", "merit", "status", "solved", "node")
 PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
-LEFT: Final = ("run", "campaign", "machine")  # columns of a store that mean nothing elsewhere
+LEFT: Final = ("run", "campaign", "machine", "message")  # mean nothing elsewhere, or name paths
 OF_A_MACHINE: Final = ("node", "cpu", "cores")
 # what may name a person's machine
 PRIVATE: Final = ("node", "system")
@@ -81,6 +83,7 @@ def look(path: Path) -> Shard:
     pa = arrow()
     try:
         file = pa.parquet.ParquetFile(path)
+        _require_columns(path, file.schema_arrow)
         about = json.loads((file.schema_arrow.metadata or {})[ABOUT])
         found = PART.fullmatch(path.name)
         name = found[1] if found else path.stem
@@ -96,6 +99,37 @@ def look(path: Path) -> Shard:
         if isinstance(error, ShardError):
             raise
         raise ShardError(f"{path}: is no part of published runs") from None
+
+
+def types() -> dict[str, Any]:
+    """The columns of a part and their types of Arrow, in their order."""
+    pa = arrow()
+    kinds = {"iteration": pa.int64(), "stage": pa.string()}
+    report = pa.struct([(name, kinds.get(name, pa.float64())) for name in HISTORY])
+    found = {
+        name: pa.string() if name in TEXTS else pa.int64() if name in WHOLE else pa.float64()
+        for name in columns()
+        if name not in LEFT
+    }
+    return {**found, "kind": pa.string(), "history": pa.list_(report)}
+
+
+def _require_columns(path: Path, schema: Any) -> None:
+    """ShardError if a part lacks a column of results, or has it in another type."""
+    for name, wanted in types().items():
+        if name not in schema.names:
+            raise ShardError(f"{path}: is no part of published runs, it has no column {name!r}")
+        if schema.field(name).type != wanted:
+            kind = schema.field(name).type
+            raise ShardError(f"{path}: column {name!r}: is of type {kind}, and {wanted} is read")
+
+
+def public_name(solver: str) -> str:
+    """The name of a solver without the folders of a program or a plug-in."""
+    scheme, colon, rest = solver.partition(":")
+    if scheme not in ("cmd", "plugin") or not colon:
+        return solver
+    return f"{scheme}:{PurePath(rest.split()[0]).name if rest.split() else ''}"
 
 
 def pack(
@@ -145,7 +179,9 @@ def pack(
         history = [dict(zip(HISTORY, report, strict=True)) for report in store.history(row["run"])]
         mine = {key: value for key, value in row.items() if key not in LEFT}
         rows.append(
-            mine | {"node": label, "kind": kinds.get(row["hash"], ""), "history": history or None}
+            mine
+            | {"solver_name": public_name(str(row["solver_name"]))}
+            | {"node": label, "kind": kinds.get(row["hash"], ""), "history": history or None}
         )
     if not rows:
         return None
@@ -154,11 +190,12 @@ def pack(
         for key, facts in own.items()
     }
     campaigns = [
-        {key: one[key] for key in CAMPAIGN if key not in ("pid", "node", "seen")}
+        {key: one[key] for key in CAMPAIGN if key not in ("pid", "node", "seen", "text")}
         for one in store.campaigns()
     ]
     about = {"version": VERSION, "machines": machines, "campaigns": campaigns}
-    table = pa.Table.from_pylist(rows, schema=schema(pa, rows[0], about))
+    metadata = {ABOUT: json.dumps(about, sort_keys=True)}
+    table = pa.Table.from_pylist(rows, schema=pa.schema(list(types().items()), metadata=metadata))
     where.mkdir(parents=True, exist_ok=True)
     part = where / f".{name}.part"
     replace_file(part, lambda beside: pa.parquet.write_table(table, beside, compression="zstd"))
@@ -167,35 +204,12 @@ def pack(
     return path
 
 
-def schema(pa: Any, row: Mapping[str, Any], about: Mapping[str, Any]) -> Any:
-    """The columns of a part."""
-    report = pa.struct(
-        [
-            ("iteration", pa.int64()),
-            ("error", pa.float64()),
-            ("time", pa.float64()),
-            ("stage", pa.string()),
-        ]
-    )
-    types = {
-        name: pa.string()
-        if name in TEXTS or name == "kind"
-        else pa.int64()
-        if name in WHOLE
-        else pa.float64()
-        for name in row
-    }
-    types["history"] = pa.list_(report)
-    metadata = {ABOUT: json.dumps(about, sort_keys=True)}
-    return pa.schema(list(types.items()), metadata=metadata)
-
-
-def rows_of(path: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+def rows_of(path: Path, chosen: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
     """The rows of a part, one after another. ShardError if one cannot be read."""
     pa = arrow()
     try:
         file = pa.parquet.ParquetFile(path)
-        for batch in file.iter_batches(columns=list(columns) if columns else None):
+        for batch in file.iter_batches(columns=list(chosen) if chosen else None):
             yield from batch.to_pylist()
     except (OSError, pa.ArrowException) as error:
         reason = str(error).splitlines()[0]
@@ -215,6 +229,8 @@ def verify(path: Path) -> list[str]:
     elif sha256(path)[:DIGITS] != found[2]:
         wrong.append(f"the content is {sha256(path)[:DIGITS]}, and the name says {found[2]}")
     own = look(path)
+    if not own.runs:
+        wrong.append("it has no run")
     keys: set[tuple[str, str]] = set()
     for number, row in enumerate(rows_of(path)):
         where = f"row {number}"
@@ -229,8 +245,10 @@ def verify(path: Path) -> list[str]:
 
 
 def contradictions(row: Mapping[str, Any]) -> list[str]:
-    """What contradicts itself in a run."""
-    wrong = []
+    """What is missing in a run, or contradicts itself."""
+    wrong = [f"has no {name}" for name in NEEDED if row[name] is None]
+    if wrong:
+        return wrong
     error, tol = row["error"], row["tol"]
     if row["status"] == "converged" and not (error is not None and error <= tol):
         wrong.append(f"is converged, and its error {error} is not within {tol}")

@@ -6,6 +6,7 @@
 // (small problems), the whole matrix is dense by columns and has no index.
 #pragma once
 
+#include <cstring>
 #include <vector>
 
 #include "linalg/matrix.hpp"
@@ -122,15 +123,20 @@ inline void BlockMatrix::add_blocks(std::size_t first, std::size_t last, const d
 #ifdef __GNUC__
     if constexpr (D == 3) {
       // two rows at once; compilers do not find this by themselves
-      using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
-      const auto pair = [](const double* p) { return *reinterpret_cast<const Pair*>(p); };
+      using Pair = double __attribute__((vector_size(16)));
+      // copied, since rows lie at any multiple of 8 bytes: clang takes a Pair to lie at one of 16
+      const auto pair = [](const double* p) {
+        Pair copy;
+        std::memcpy(&copy, p, sizeof copy);
+        return copy;
+      };
       Pair upper = pair(target);
       double lower = target[2];
       for (int c = 0; c < D; ++c) {
         upper += pair(block + D * c) * x[c];
         lower += block[D * c + 2] * x[c];
       }
-      *reinterpret_cast<Pair*>(target) = upper;
+      std::memcpy(target, &upper, sizeof upper);
       target[2] = lower;
       continue;
     }

@@ -1,4 +1,4 @@
-# The command `fclib`: docker build --tag fclib . && docker run --rm -v "$PWD:/data" fclib info FILE
+# Not tried yet. The command `fclib`: docker build --tag fclib . && docker run --rm -v "$PWD:/data" fclib info FILE
 FROM debian:13-slim AS build
 RUN apt-get update && apt-get install -y --no-install-recommends \
     g++ cmake ninja-build pkg-config libhdf5-dev libeigen3-dev python3-dev python3-venv git \

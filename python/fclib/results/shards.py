@@ -34,7 +34,6 @@ NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 NEEDED: Final = ("key", "problem", "hash", "solver", "tol", "merit", "status", "solved", "node")
 PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
 LEFT: Final = ("run", "campaign", "machine", "message")  # mean nothing elsewhere, or name paths
-OF_A_MACHINE: Final = ("node", "cpu", "cores")
 # what may name a person's machine
 PRIVATE: Final = ("node", "system")
 

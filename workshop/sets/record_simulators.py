@@ -66,7 +66,8 @@ def newtons() -> Iterator[tuple[Any, Any, Any]]:
 
 def siconoses() -> Iterator[tuple[Any, Any, Any]]:
     """The same of Siconos, which tells only matrices: without places and turns."""
-    arguments = [str(1 + KEPT * ENGINES["Siconos"].every), repr(0.5 * LEAN / SIZE)]
+    steps = 1 + KEPT * ENGINES["Siconos"].every
+    arguments = recorded_steps.siconos_pile(steps, LEAN)
     for one in steps_of_siconos(SICONOS, arguments, 1):
         yield one, None, None
 

@@ -97,7 +97,7 @@ def record(name: str, out: Path) -> None:
     about: dict[str, Any] = {}
     due = engine.every
     for number, (one, places, turns) in enumerate(engine.steps()):
-        # where nothing touches the next step that has contacts
+        # if nothing touches, the next step that has contacts
         if number >= due and one is not None and one.assembled.problem.nc:
             due += engine.every
             kept.append(step_of(one, number, places, turns, engine.first))

@@ -8,7 +8,7 @@ Of each set, `standard` and `tiny` by default, every family whose newest states 
 (`fclib.simulate.relaxed`): positions move apart, velocities, numbers and steps stay, and so do the
 states that are within the bound. The lists get the new digests, and for `standard` the table of
 candidates the new rows of its problems; `hard` follows by `fclib collection choose hard`. This
-writes into `collection/` and `python/fclib/collections/data/`, and does nothing where all is within
+writes into `collection/` and `python/fclib/collections/data/`, and does nothing if all is within
 the bound. Minutes of CPU, most of them for Chute4000.
 
 `--results NAME` stores a table of the relaxed states beside those they were made from, and makes
@@ -51,7 +51,7 @@ def depth(states: trajectory.Trajectory, contacts: Any) -> float:
 
 
 def mended(states: trajectory.Trajectory, version: str) -> trajectory.Trajectory | None:
-    """A version of states within the bound; None where they are."""
+    """A version of states within the bound; None if they are."""
     model, scheme = states.model, states.scheme
     position = states.position.copy()
     for k in range(len(states)):

@@ -5,12 +5,12 @@
         [--kind Packing Wall] [--contacts 300 1000 3000 10000]
 
 The linear systems of `auto` on problems of these sizes: on the contacts (blocks of 3 x 3, linked
-where they share a body) and on the bodies. Only the pattern is the problem's; the numbers are
+if they share a body) and on the bodies. Only the pattern is the problem's; the numbers are
 random, with a dominant diagonal. CPU times of one thread, of a factorisation the least of three.
 Needs a C++ compiler, Eigen and METIS.
 
 Of orderings, the column "ratio" is plan and factorisation by the better ordering over those by
-minimum degree, where a plan is used for --uses factorisations. "memory" is what a factorisation by
+minimum degree, if a plan is used for --uses factorisations. "memory" is what a factorisation by
 minimum degree took at its peak, in MB, and over what was predicted.
 
 The libraries are UMFPACK, CHOLMOD and Eigen (SparseLU). Each orders the matrix as it does by
@@ -72,7 +72,7 @@ def patterns(problem: Any) -> dict[str, tuple[int, Any]]:
     blocks = sp.kron(sp.eye_array(problem.nc), np.ones((d, 1)), format="csr")
     touched = H @ blocks
     M = abs(sp.csc_array(problem.M))
-    # contacts that share a body, where M has nothing between bodies
+    # contacts that share a body, if M has nothing between bodies
     bodies = sp.csc_array(touched @ touched.T + M)
     mobile = sp.csc_array(M @ touched)
     return {"contacts": (d, sp.csc_array(touched.T @ mobile)), "bodies": (1, bodies)}

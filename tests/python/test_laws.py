@@ -64,7 +64,7 @@ def test_reactions_with_cohesion_pull_and_balance_the_tower() -> None:
 def test_shifted_problem_is_the_law_with_cohesion(kind: str) -> None:
     """On the problem that has not been shifted: momentum, and the law of each contact."""
     own = family("CohesiveWall")
-    problem = own.of_kind(kind, 100, 0.9)
+    problem = own.of_kind(kind, 100, 0.05 if kind == "pushed" else 0.9)
     glue = facts(problem)["cohesion_impulse"]
     bodies = assembly.running_bond(100, 0, push=own.push if kind == "pushed" else 0.0)
     plain = bodies.problem(own.mu, "")
@@ -81,14 +81,12 @@ def test_shifted_problem_is_the_law_with_cohesion(kind: str) -> None:
     scale = np.abs(solution.v).max()
     assert u[:, 0].min() > -1e-8 * scale
     apart = u[:, 0] > 1e-6 * scale
-    assert apart.any()
+    assert apart.any() == (kind == "curtain")
     np.testing.assert_allclose(r[apart, 0], -glue, atol=1e-6 * glue)
     tangential = np.linalg.norm(r[:, 1:], axis=1)
     assert np.all(tangential <= own.mu * (r[:, 0] + glue) + 1e-7 * glue)
     slides = np.linalg.norm(u[:, 1:], axis=1) > 1e-5 * scale
-    np.testing.assert_allclose(
-        tangential[slides], own.mu * (r[slides, 0] + glue), atol=1e-5 * glue
-    )
+    np.testing.assert_allclose(tangential[slides], own.mu * (r[slides, 0] + glue), atol=1e-5 * glue)
 
 
 def test_wall_without_glue_is_the_plain_one() -> None:
@@ -142,7 +140,7 @@ def test_local_form_has_compliance_on_the_diagonal() -> None:
     problem = family("CompliantPatches").grip(4, 0.0, 1.1)
     count, nc = 6, problem.nc
     rigid = problem.H[:count]
-    W = (rigid.T @ np.diag(1 / problem.M.diagonal()[:count]) @ rigid.toarray())
+    W = rigid.T @ np.diag(1 / problem.M.diagonal()[:count]) @ rigid.toarray()
     R = np.zeros(3 * nc)
     R[0::3] = 1 / problem.M.diagonal()[count:]
     local = problem.condense()
@@ -207,7 +205,9 @@ def test_scaled_reactions_are_those_of_an_ellipse_and_dissipate_most() -> None:
     problem = own.problem(6)  # ratio 20
     known = facts(problem)
     S = np.array(known["S"])
-    assert (known["mu1"], known["mu2"]) == pytest.approx((own.mu / math.sqrt(20), own.mu * math.sqrt(20)))
+    assert (known["mu1"], known["mu2"]) == pytest.approx(
+        (own.mu / math.sqrt(20), own.mu * math.sqrt(20))
+    )
     solution = solved(problem, 1e-10)
     r = blocks(solution.r) / S
     u = blocks(problem.H.T @ solution.v) * S

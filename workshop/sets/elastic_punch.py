@@ -42,9 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("out", type=Path)
     out = parser.parse_args().out
-    arrays = {
-        f"slipped{face}": np.stack(path_of(*kind)) for face, kind in enumerate(KINDS_OF_FACE)
-    }
+    arrays = {f"slipped{face}": np.stack(path_of(*kind)) for face, kind in enumerate(KINDS_OF_FACE)}
     np.savez_compressed(out, **arrays)
 
 

@@ -58,7 +58,9 @@ class Capstan:
     held: float = parameter(10.0, "N", "tension at the end that is held")
 
     def __post_init__(self) -> None:
-        mjcf.check(self, positive=("drum", "cable", "density", "held"), non_negative=("mu", "vibration"))
+        mjcf.check(
+            self, positive=("drum", "cable", "density", "held"), non_negative=("mu", "vibration")
+        )
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """By turns, then nodes of a turn, then pull; the seed draws the vibration."""
@@ -123,7 +125,9 @@ class Capstan:
             (frame.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * count, 3 * count)
         )
         between = np.arange(count - 1)
-        ends = np.concatenate((3 * between[:, None] + np.arange(3), 3 * between[:, None] + (3, 4, 5)))
+        ends = np.concatenate(
+            (3 * between[:, None] + np.arange(3), 3 * between[:, None] + (3, 4, 5))
+        )
         signs = np.concatenate((-along[1:-1], along[1:-1]))
         G = sp.csc_array(
             (signs.ravel(), (ends.ravel(), np.tile(np.repeat(between, 3), 2))),

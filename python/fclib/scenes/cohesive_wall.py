@@ -10,11 +10,13 @@ import numpy as np
 from fclib.scenes.shared import assembly, mjcf
 from fclib.scenes.shared.family import parameter
 
-KINDS: Final = ("tower", "curtain", "pushed")
 SIZES: Final = (100, 300, 1000, 3000)  # approximate numbers of contacts
-# of a tower and a curtain: cohesion over the load of the uppermost joint; of the pushed wall: over
-# the mean weight on a contact of the ground
-SHARES: Final = (0.9, 1.05, 2.0)
+# cohesion over the mean load of a contact of the uppermost joint, or of the ground if pushed
+SHARES: Final = {
+    "tower": (0.9, 1.05, 2.0),
+    "curtain": (0.9, 1.05, 2.0),
+    "pushed": (0.05, 0.2, 0.8),
+}
 CORNERS: Final = 4  # contacts of two faces
 BLOCK: Final = 1000.0  # mass of a block of a tower [kg]
 
@@ -46,7 +48,7 @@ class CohesiveWall:
     authors: ClassVar[str] = "the authors of FCLIB; the law: LMGC90, A. Taboada and others"
     friction: ClassVar[str] = "Coulomb with cohesion, as Coulomb by a shift of the reactions"
     collection: ClassVar[str] = "laws"
-    problems: ClassVar[int] = len(KINDS) * len(SIZES) * len(SHARES)
+    problems: ClassVar[int] = 3 * len(SIZES) * len(SHARES)
 
     mu: float = parameter(0.5, "1", "coefficient of friction")
     push: float = parameter(0.3, "1", "impulse on the top of the pushed wall, in its weights")
@@ -56,9 +58,10 @@ class CohesiveWall:
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """By kind, then size, then cohesion; the seed draws the masses of walls."""
-        kind, rest = divmod(number, len(SIZES) * len(SHARES))
-        size, share = divmod(rest, len(SHARES))
-        return self.of_kind(KINDS[kind], SIZES[size], SHARES[share], seed)
+        which, rest = divmod(number, len(SIZES) * 3)
+        size, share = divmod(rest, 3)
+        kind = list(SHARES)[which]
+        return self.of_kind(kind, SIZES[size], SHARES[kind][share], seed)
 
     def of_kind(self, kind: str, contacts: int, share: float, seed: int = 0) -> Any:
         """A problem of about so many contacts; `share` as in SHARES."""

@@ -95,9 +95,7 @@ class ElasticPunch:
         back = 2 * max(along - ASIDE, 0) / BACK
         return (aside - back) * self.aside, pressed * self.down
 
-    def of_step(
-        self, kind: str, bricks: int, step: int, slipped: npt.NDArray[np.float64]
-    ) -> Any:
+    def of_step(self, kind: str, bricks: int, step: int, slipped: npt.NDArray[np.float64]) -> Any:
         """The problem of a step of the path.
 
         Args:
@@ -223,6 +221,5 @@ def history() -> tuple[Vector, ...]:
     """Of each face the displacements along x and y (STEPS x nc x 2) at the end of each step [m]."""
     with np.load(FILE) as arrays:
         return tuple(
-            QUANTUM * arrays[f"slipped{face}"].astype(float)
-            for face in range(len(KINDS_OF_FACE))
+            QUANTUM * arrays[f"slipped{face}"].astype(float) for face in range(len(KINDS_OF_FACE))
         )

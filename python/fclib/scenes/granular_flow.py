@@ -87,9 +87,7 @@ def problem_of(state: State) -> Any:
     bodies = bodies_of(state)
     h = state.step
     problem = bodies.problem(MU, f"{len(state.radii)} spheres, t = {state.time:.3f} s")
-    momentum = np.hstack(
-        (bodies.masses[:, None] * state.velocities, bodies.inertias * state.spins)
-    )
+    momentum = np.hstack((bodies.masses[:, None] * state.velocities, bodies.inertias * state.spins))
     momentum[:, 2] -= h * assembly.GRAVITY * bodies.masses
     gaps = np.asarray(bodies.gaps)
     w = np.zeros(3 * len(gaps))
@@ -101,9 +99,7 @@ def problem_of(state: State) -> Any:
     return problem.replace(
         f=momentum.ravel(),
         w=w,
-        info=_core.ProblemInfo(
-            title=info.title, description=info.description, math_info=math_info
-        ),
+        info=_core.ProblemInfo(title=info.title, description=info.description, math_info=math_info),
     )
 
 

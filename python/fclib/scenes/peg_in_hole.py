@@ -13,7 +13,7 @@ from fclib.scenes.shared import assembly, mjcf
 from fclib.scenes.shared.family import parameter
 
 PINS: Final = (2, 4, 8, 12)  # along an edge
-DEPTHS: Final = (0.3, 1.0, 3.0)  # of the pins in their holes, in widths of a hole
+DEPTHS: Final = (1.0, 3.0, 10.0)  # of the pins in their holes, in widths of a hole
 OFFSETS: Final = (0.9, 1.1)  # of the push, of the least that jams
 MACHINED: Final = (False, True)  # whether the holes' widths differ
 
@@ -26,16 +26,16 @@ class PegInHole:
     """A rigid connector with k x k square pins, tilted by its play, is pushed into a plate.
 
     Each pin touches its hole at the mouth on one side and with its end on the other, at two corners
-    each: four contacts. They are D apart across and L along the hole. The push F is parallel to the
-    holes, and e beside the row of pins that is farthest off. Normal forces N on either side and
-    friction, up to mu N on each, carry it at rest if F <= 2 mu N; moments about those pins ask for
-    N L <= F e if friction acts there equally on both sides, and anywhere else they ask for less.
+    each: four contacts. They are D apart across and L along the hole. The first and the last row of
+    pins are 2 X apart. The push F is parallel to the holes, and e beside the first row.
 
-    jammed  if L > mu D, a solution at rest exists if and only if e >= L / (2 mu)
-    wedged  if L <= mu D, the line between both contacts is in both friction cones: forces along it
-            carry any push
+    wedged  if L <= mu (2 X + D), the line from the mouth of the last row to the ends of the first
+            one is in the friction cones of both: forces along it carry any push
+    jammed  else a solution at rest exists if and only if e >= L / (2 mu). The normal forces N on
+            either side are equal, and friction is up to mu N on each: F <= 2 mu N. With all of it
+            at the first row, N L = F e. Anywhere else it asks for a larger e
 
-    With one pin this is D. E. Whitney's jamming in the plane. A solution at rest is not the only
+    With one pin this is D. E. Whitney's, in the plane. A solution at rest is not the only
     one: the connector may also turn. With machined holes each pin has a gap of its own, and few of
     them bear the load.
 
@@ -74,9 +74,7 @@ class PegInHole:
             gaps -= gaps.min()
         return self.of_pins(PINS[pins], DEPTHS[depth], OFFSETS[offset], gaps)
 
-    def of_pins(
-        self, pins: int, depth: float, offset: float, gaps: npt.NDArray[np.float64]
-    ) -> Any:
+    def of_pins(self, pins: int, depth: float, offset: float, gaps: npt.NDArray[np.float64]) -> Any:
         """A connector of pins x pins; depth in widths, gaps (pins^2) [m].
 
         The push is `offset` times L / (2 mu) beside the first row.
@@ -122,7 +120,7 @@ class PegInHole:
         w = np.zeros(12 * count)
         w[0::3] = gaps[pin] / h
         problem = bodies.problem(self.mu, title)
-        facts = {"offset": e, "depth": L, "wedges": bool(L <= self.mu * D)}
+        facts = {"offset": e, "depth": L, "wedges": bool(L <= self.mu * (x.max() - x.min() + D))}
         return problem.replace(
             f=f,
             w=w,
@@ -167,4 +165,7 @@ class PegInHole:
         )
         shape = np.column_stack((right, len(plate) + 1 + pin)).astype(np.int32)
         feature = np.tile([0, 1, 0, 1], count).astype(np.int32)
-        return {"bodies": tables, "contacts": replace(problem.contacts, shape=shape, feature=feature)}
+        return {
+            "bodies": tables,
+            "contacts": replace(problem.contacts, shape=shape, feature=feature),
+        }

@@ -44,9 +44,7 @@ class Block:
 
     def places(self) -> Vector:
         """(nodes x 3) [m]."""
-        axes = [
-            edge * np.arange(count) for edge, count in zip(self.edges, self.nodes, strict=True)
-        ]
+        axes = [edge * np.arange(count) for edge, count in zip(self.edges, self.nodes, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
     def bricks(self) -> Integers:

@@ -143,9 +143,9 @@ def test_tensions_in_a_series_hold_the_cable_up_to_the_limit(turns: float, of_a_
         known = facts(problem)
         # a tension that grows alike at each mass; lambda pushes, tensions pull
         tension = own.held * (known["pull"] / own.held) ** (np.arange(count + 1) / count)
-        l = -assembly.STEP * tension[1:-1]
-        r = problem.H.T @ -(problem.G @ l + problem.f)
-        merit = fclib.merit(problem, fclib.Solution(v=np.zeros(problem.n), r=r, l=l))
+        pushes = -assembly.STEP * tension[1:-1]
+        r = problem.H.T @ -(problem.G @ pushes + problem.f)
+        merit = fclib.merit(problem, fclib.Solution(v=np.zeros(problem.n), r=r, l=pushes))
         assert (merit.natural < 1e-12) == holds
         assert (merit.cone < 1e-12) == holds
         if holds:

@@ -1,4 +1,4 @@
-"""Blocks without inertia: stiffness, Cattaneo and Mindlin's slip, tangents that are not symmetric."""
+"""Blocks without inertia: stiffness, the slip of Cattaneo and Mindlin, asymmetric tangents."""
 
 import functools
 import itertools

@@ -1,7 +1,7 @@
 """A further version of stored states: those that are stored, and more of a new simulation.
 
     fclib collection simulate GearTrain Rover --tol 1e-7 --version 2 --out TR
-    python -m workshop.sets.more_states machines/GearTrain machines/Rover --from TR --count 200 --out OUT
+    python -m workshop.sets.more_states machines/GearTrain machines/Rover --from TR --out OUT
 
 A simulation made again is another one in its last digits, and in the end in all of them. So the
 states that are stored stay, with their numbers and digests, and those of the new simulation stand

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
@@ -26,8 +27,8 @@ class Capstan:
 
     Each mass touches the drum; the segments keep their lengths, as bilateral constraints. Let two
     neighbouring segments be at the angle delta, with the tensions S and S' > S. Their sum presses
-    the mass to the drum by (S + S') sin(delta / 2) and pulls it along by (S' - S) cos(delta / 2). It
-    sticks if and only if
+    the mass to the drum by (S + S') sin(delta / 2) and pulls it along by (S' - S) cos(delta / 2).
+    It sticks if and only if
 
         S' <= q S,   q = (1 + mu tan(delta / 2)) / (1 - mu tan(delta / 2)).
 
@@ -94,7 +95,7 @@ class Capstan:
         """Of the segments before and after node 0."""
         places = [self._place(node, of_a_turn) for node in (-1, 0, 1)]
         found = []
-        for a, b in zip(places[:-1], places[1:], strict=True):
+        for a, b in itertools.pairwise(places):
             length = math.dist(a, b)
             found.append([(q - p) / length for p, q in zip(a, b, strict=True)])
         return found[0], found[1]
@@ -152,9 +153,9 @@ class Capstan:
                 _core.ProblemInfo(
                     title=title,
                     math_info=(
-                        f"one step, h = {assembly.STEP:g} s; M v = H r + G lambda + f, f = M v0 + h F,"
-                        " u = H^T v, G^T v = 0; masses without spin; lambda is h times what presses"
-                        " a segment; components N, T1 along the cable, T2"
+                        f"one step, h = {assembly.STEP:g} s; M v = H r + G lambda + f,"
+                        " f = M v0 + h F, u = H^T v, G^T v = 0; masses without spin; lambda is h"
+                        " times what presses a segment; components N, T1 along the cable, T2"
                     ),
                 ),
                 {"held": self.held, "pull": pull * most, "limit": most},

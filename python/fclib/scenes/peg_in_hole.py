@@ -120,7 +120,7 @@ class PegInHole:
         w = np.zeros(12 * count)
         w[0::3] = gaps[pin] / h
         problem = bodies.problem(self.mu, title)
-        facts = {"offset": e, "depth": L, "wedges": bool(L <= self.mu * (x.max() - x.min() + D))}
+        facts = {"offset": e, "depth": L, "wedges": bool(self.mu * (x.max() - x.min() + D) >= L)}
         return problem.replace(
             f=f,
             w=w,

@@ -113,14 +113,14 @@ class PlasticTangent:
         block = Block((bricks, bricks, bricks // 2), (self.edge / bricks,) * 3)
         elastic = of_moduli(self.bulk - 2 * self.shear / 3, self.shear)
         # a band across the block, from its upper left edge to the plate on the right
-        x, y, z = (
+        x, _, z = (
             part.ravel() for part in np.meshgrid(*map(np.arange, block.counts), indexing="ij")
         )
         yields = (np.abs(x - (bricks - 1 - 2 * z)) <= bricks // 3).astype(np.int64)
         K = block.stiffness([elastic, self.tangent(dilatancy)], yields)
         numbers = block.numbers()
         forces = np.zeros((numbers.size, 3))
-        # sides carry the stress from outside; what is left of f_ext - f_int acts on the plate's side
+        # sides carry the stress from outside: what is left of f_ext - f_int acts on the lower face
         share = np.ones(block.nodes[:2]) * (self.edge / bricks) ** 2
         share[[0, -1]] *= 0.5
         share[:, [0, -1]] *= 0.5

@@ -1,6 +1,6 @@
 """Stiffness of a block of equal bricks of eight nodes, for any constant tangent.
 
-K_(a i)(b j) = sum_kl C_ikjl int d_k N_a d_l N_b. On a brick the integrals are products of one for
+K_(a i)(b j) = sum_km C_ikjm int d_k N_a d_m N_b. On a brick the integrals are products of one for
 each axis, which are exact; all sums are taken in one order, the same everywhere.
 """
 
@@ -58,7 +58,7 @@ class Block:
         """K (3 nodes x 3 nodes), not symmetric if a tangent is not.
 
         Args:
-            tangents: C (3 x 3 x 3 x 3) each: stress_ik = C_ikjl strain_jl [Pa].
+            tangents: C (3 x 3 x 3 x 3) each: stress_ik = C_ikjm strain_jm [Pa].
             which: (bricks) the tangent of each.
         """
         own = [self._brick(tangent).ravel() for tangent in tangents]
@@ -76,25 +76,25 @@ class Block:
     def _brick(self, tangent: Vector) -> Vector:
         """(24 x 24) of one brick."""
         K = np.zeros((8, 3, 8, 3))
-        for k, l in itertools.product(range(3), repeat=2):
-            integrals = self._integrals(k, l)
-            K += integrals[:, None, :, None] * tangent[:, k, :, l][None, :, None, :]
+        for k, m in itertools.product(range(3), repeat=2):
+            integrals = self._integrals(k, m)
+            K += integrals[:, None, :, None] * tangent[:, k, :, m][None, :, None, :]
         K = K.reshape(24, 24)
         same = tangent == tangent.transpose(2, 3, 0, 1)
         if same.all():  # rounding aside, K is symmetric
             K = 0.5 * (K + K.T)
         return K
 
-    def _integrals(self, k: int, l: int) -> Vector:
-        """(8 x 8) int d_k N_a d_l N_b over a brick."""
+    def _integrals(self, k: int, m: int) -> Vector:
+        """(8 x 8) int d_k N_a d_m N_b over a brick."""
         found = np.ones((8, 8))
         for axis in range(3):
             edge = self.edges[axis]
-            if axis == k and axis == l:
+            if axis == k and axis == m:
                 table, scale = STIFFNESS, 1 / edge
             elif axis == k:
                 table, scale = MIXED, 1.0
-            elif axis == l:
+            elif axis == m:
                 table, scale = tuple(zip(*MIXED, strict=True)), 1.0
             else:
                 table, scale = MASS, edge
@@ -112,10 +112,10 @@ def isotropic(young: float, poisson: float) -> Vector:
 
 
 def of_moduli(lame: float, shear: float) -> Vector:
-    """C_ikjl = lambda d_ik d_jl + G (d_ij d_kl + d_il d_kj)."""
+    """C_ikjm = lambda d_ik d_jm + G (d_ij d_km + d_im d_kj)."""
     C = np.zeros((3, 3, 3, 3))
-    for i, k, j, l in itertools.product(range(3), repeat=4):
-        C[i, k, j, l] = lame * (i == k) * (j == l) + shear * (
-            (i == j) * (k == l) + (i == l) * (k == j)
+    for i, k, j, m in itertools.product(range(3), repeat=4):
+        C[i, k, j, m] = lame * (i == k) * (j == m) + shear * (
+            (i == j) * (k == m) + (i == m) * (k == j)
         )
     return C

@@ -189,25 +189,42 @@ def clamped(
             ),
         ),
         contacts=contacts,
-        bodies=table(block),
+        bodies=table(block, gap),
     )
 
 
-def table(block: Block) -> Bodies:
-    """The plane, and the block as one box."""
+def table(block: Block, gap: Vector) -> Bodies:
+    """The plane, and the surface of the block as a mesh, its lower face raised by gaps (nc)."""
     upright = (1.0, 0.0, 0.0, 0.0)
-    half = 0.5 * np.multiply(block.counts, block.edges)
+    numbers = block.numbers()
+    places = block.places()
+    places[numbers[:, :, 0].ravel(), 2] += gap
+    quads = []
+    for axis in range(3):
+        for end in (0, -1):
+            face = np.take(numbers, end, axis=axis)
+            around = (face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:])
+            # counterclockwise from outside
+            outwards = (end == 0) == (axis == 1)
+            order = around if outwards else around[::-1]
+            quads.append(np.stack([part.ravel() for part in order], axis=1))
+    face = np.concatenate(quads)
+    kept, corner = np.unique(face, return_inverse=True)
+    face = corner.reshape(face.shape).astype(np.int32)
     return Bodies(
         name="plane\nblock",
         moves=np.array([0, 1], np.int32),
-        place=np.vstack((np.zeros(3), half)),
+        place=np.zeros((2, 3)),
         turn=np.tile(upright, (2, 1)),
         shape_body=np.arange(2, dtype=np.int32),
-        shape_kind=np.array([KINDS.index("plane"), KINDS.index("box")], np.int32),
-        shape_size=np.vstack((np.zeros(3), half)),
+        shape_kind=np.array([KINDS.index("plane"), KINDS.index("mesh")], np.int32),
+        shape_size=np.zeros((2, 3)),
         shape_place=np.zeros((2, 3)),
         shape_turn=np.tile(upright, (2, 1)),
-        shape_mesh=np.full(2, -1, np.int32),
+        shape_mesh=np.array([-1, 0], np.int32),
+        mesh_first=np.array([[0, 0], [len(kept), len(face)]], np.int32),
+        vertex=places[kept],
+        face=face,
     )
 
 

@@ -7,7 +7,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,9 @@ REACH: Final = 0.05  # largest gap of a contact, in d
 SHARE: Final = 0.2  # of a penetration that is undone in a step
 
 
+Vector: TypeAlias = npt.NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """A stored state, in m, m/s and rad/s."""
@@ -37,10 +40,10 @@ class State:
     time: float  # since the gate opened [s]
     step: float  # h [s]
     wide: float  # of the channel [m]
-    radii: npt.NDArray[np.float64]  # (n)
-    places: npt.NDArray[np.float64]  # (n x 3)
-    velocities: npt.NDArray[np.float64]  # (n x 3)
-    spins: npt.NDArray[np.float64]  # (n x 3)
+    radii: Vector  # (n)
+    places: Vector  # (n x 3)
+    velocities: Vector  # (n x 3)
+    spins: Vector  # (n x 3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,13 +166,13 @@ def stored(size: int) -> tuple[State, ...]:
     """The states of a size, in time."""
     with np.load(path()) as arrays:
         head = arrays[f"head{size}"].tolist()  # width and time step, in d and sqrt(d / g)
-        radii = whole(arrays[f"radii{size}"]).T[:, 0] * (RADIUS * 0.5 * DIAMETER)
+        radii: Vector = whole(arrays[f"radii{size}"]).T[:, 0] * (RADIUS * 0.5 * DIAMETER)
         speed = math.sqrt(assembly.GRAVITY * DIAMETER)
         unit = math.sqrt(DIAMETER / assembly.GRAVITY)  # of time
         units = (PLACE * DIAMETER, VELOCITY * speed, SPIN / unit)
         states = []
         for k, time in enumerate(arrays[f"time{size}"].tolist()):
-            three = [
+            three: list[Vector] = [
                 whole(arrays[f"{name}{size}_{k}"]).T * one
                 for name, one in zip(("place", "velocity", "spin"), units, strict=True)
             ]

@@ -17,11 +17,12 @@ import scipy.sparse as sp
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 Integers: TypeAlias = npt.NDArray[np.int64]
+Table: TypeAlias = tuple[tuple[float, ...], ...]
 
 # of the two linear functions on [0, 1]: int N_a N_b, int N_a' N_b, int N_a' N_b'
-MASS: Final = ((1 / 3, 1 / 6), (1 / 6, 1 / 3))
-MIXED: Final = ((-0.5, -0.5), (0.5, 0.5))
-STIFFNESS: Final = ((1.0, -1.0), (-1.0, 1.0))
+MASS: Final[Table] = ((1 / 3, 1 / 6), (1 / 6, 1 / 3))
+MIXED: Final[Table] = ((-0.5, -0.5), (0.5, 0.5))
+STIFFNESS: Final[Table] = ((1.0, -1.0), (-1.0, 1.0))
 CORNERS: Final = tuple(itertools.product((0, 1), repeat=3))  # of a brick, x first
 
 
@@ -79,17 +80,18 @@ class Block:
         for k, m in itertools.product(range(3), repeat=2):
             integrals = self._integrals(k, m)
             K += integrals[:, None, :, None] * tangent[:, k, :, m][None, :, None, :]
-        K = K.reshape(24, 24)
+        whole: Vector = K.reshape(24, 24)
         same = tangent == tangent.transpose(2, 3, 0, 1)
         if same.all():  # rounding aside, K is symmetric
-            K = 0.5 * (K + K.T)
-        return K
+            whole = 0.5 * (whole + whole.T)
+        return whole
 
     def _integrals(self, k: int, m: int) -> Vector:
         """(8 x 8) int d_k N_a d_m N_b over a brick."""
         found = np.ones((8, 8))
         for axis in range(3):
             edge = self.edges[axis]
+            table: Table
             if axis == k and axis == m:
                 table, scale = STIFFNESS, 1 / edge
             elif axis == k:

@@ -42,12 +42,16 @@ SETS: dict[str, tuple[str, str]] = {
     "existence": ("3", "without a solution, or with several, and known to be so"),
     "dynamics": ("3", "silo, rope, spinning bodies, friction that differs by contact"),
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
-    "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "machines": ("2", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "quasistatic": ("1", "without inertia: M is a stiffness, of rubber, or of soil that yields"),
+    "laws": ("1", "cohesion, compliance, friction by ellipses, as Coulomb's problem"),
+    "assembly": ("1", "pins in holes, a cable around a drum"),
+    "flows": ("1", "a granular flow of up to 100,000 contacts"),
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
     "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
     "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("16", "all families that came after RT-0444"),
+    "extended": ("17", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("9", "what most solvers fail on, of standard and of the later sets"),
     "tiny": ("6", "one problem of each kind; comes with the package"),
@@ -55,6 +59,7 @@ SETS: dict[str, tuple[str, str]] = {
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
     *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "decks", "rr9118"),
+    *("quasistatic", "laws", "assembly", "flows"),
 )
 
 

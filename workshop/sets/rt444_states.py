@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import io
 import math
 import os
 import signal
@@ -28,10 +29,12 @@ import sys
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import scipy.sparse as sp
 
 import fclib
 from fclib import _digest
@@ -44,10 +47,12 @@ from fclib.simulate.rounding import exponent_of
 from workshop.sets._rt444_scenes import SCENES, Body, Scene
 
 RUN: Final = "run-"  # the folders of the steps that one command recorded
+DRIVERS: Final = ("fclib", "admm")
 SCRIPT: Final = Path(__file__).with_name("_siconos_rt444.py")
 PROBLEMS: Final = {"BoxesStack": 1514, "Capsules": 1705, "KaplasTower": 201}  # of the report
 LEAST: Final = 80  # sweeps: a step that takes more is kept
 TOLERANCE: Final = 1e-8
+DRIVEN: Final = 2.0  # limit of a step of a simulation [s]; its best iterate is taken
 MOST: Final = 200_000  # sweeps of the judgement
 NEAR: Final = 1e-6
 SEED: Final = 0
@@ -91,7 +96,7 @@ WORDS: Final = {
 # ---- simulation
 
 
-def simulate(name: str, folder: Path, every: int, end: float) -> None:
+def simulate(name: str, folder: Path, every: int, end: float, driver: str) -> None:
     """Go on from the last recorded step, up to the end [s]."""
     if word := siconos.missing():
         sys.exit(word)
@@ -103,14 +108,44 @@ def simulate(name: str, folder: Path, every: int, end: float) -> None:
     command = [siconos.python(), str(_siconos.STEPS), str(run), str(every), str(SCRIPT)]
     # so that Siconos ends with this command
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    status = subprocess.run(
-        [*command, name, str(end), *start],
-        check=False,
+    here, there = Pipe()
+    environment = os.environ | dict.fromkeys(siconos.THREADS, "1")
+    environment["FCLIB_SOLVES"] = str(there.fileno())
+    with subprocess.Popen(
+        [*command, name, str(end), driver, *start],
         stdout=subprocess.DEVNULL,
-        env=os.environ | dict.fromkeys(siconos.THREADS, "1"),
-    ).returncode
-    if status:
-        sys.exit(f"{name}: Siconos ended with status {status}; the same command goes on")
+        env=environment,
+        pass_fds=[there.fileno()],
+    ) as process:
+        there.close()
+        try:
+            solves(here)
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        sys.exit(
+            f"{name}: Siconos ended with status {process.returncode}; the same command goes on"
+        )
+
+
+def solves(connection: Any) -> None:
+    """Answer Siconos' problems with reactions, until it ends."""
+    while True:
+        try:
+            told = np.load(io.BytesIO(connection.recv_bytes()))
+        except EOFError:
+            return
+        m = told["q"].size
+        W = sp.csc_array((told["data"], told["indices"], told["indptr"]), shape=(m, m))
+        problem = fclib.LocalProblem(spacedim=3, W=W, q=told["q"], mu=told["mu"])
+        found = fclib.solve(problem, tol=TOLERANCE, time_limit=DRIVEN)
+        connection.send_bytes(np.ascontiguousarray(found.solution.r).tobytes())
+
+
+def folders(states: Path, name: str) -> list[Path]:
+    """The simulations of a scene."""
+    return [states / f"{name}-{driver}" for driver in DRIVERS if (states / f"{name}-{driver}").is_dir()]
 
 
 def files(folder: Path) -> dict[int, Path]:
@@ -395,6 +430,7 @@ def main() -> None:
     parser.add_argument("--states", type=Path, required=True, help="folder of recorded steps")
     parser.add_argument("--every", type=int, default=4, help="record one step in so many")
     parser.add_argument("--end", type=float, help="of a simulation [s]; by default the scene's")
+    parser.add_argument("--driver", choices=DRIVERS, default="fclib")
     parser.add_argument("--most", type=int, default=MOST, help="sweeps of a judgement")
     parser.add_argument("--out", type=Path, help="folder of trajectories")
     parser.add_argument("--version", default="1")
@@ -404,13 +440,14 @@ def main() -> None:
         return status(own.states)
     if own.scene is None or (own.command == "choose" and own.out is None):
         parser.error("name a scene, and a folder for choose (--out)")
-    folder = own.states / own.scene
     if own.command == "simulate":
-        simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end)
+        folder = own.states / f"{own.scene}-{own.driver}"
+        simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end, own.driver)
     elif own.command == "judge":
-        judge(own.scene, folder, own.most)
+        for folder in folders(own.states, own.scene):
+            judge(own.scene, folder, own.most)
     else:
-        choose(own.scene, folder, own.out, own.version, own.count or PROBLEMS[own.scene])
+        choose(own.scene, own.states, own.out, own.version, own.count or PROBLEMS[own.scene])
     return None
 
 

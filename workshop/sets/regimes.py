@@ -72,8 +72,7 @@ class Regime:
 
 STEEL = {"young": 2e11, "density": 7800.0, "time_step": 0.0125}
 CHUTE = {"hexahedra": True, "gaps": True, "spheres": 0.0, "slope": 0.6}
-# the column of spheres of the library's sets of 2024, and its copies: in mm, and with mm as the unit
-# of length and g as that of mass
+# the column of spheres of the library's sets of 2024; in mm; and with mm as the unit of length
 COLUMN = {
     **{"spheres": 2000, "radius": 0.7, "spread": 0.0, "density": 0.696, "across": 10},
     **{"gap": 0.6, "lift": 4.0, "offset": 0.05, "width": 39.0, "all_bodies": True},
@@ -83,7 +82,7 @@ MILLIMETRES = COLUMN | {
     **{"density": 1000.0, "time_step": 5e-5},
 }
 SCALED = COLUMN | {
-    **{"radius": 0.9, "gap": 0.2, "gravity": 9810.0, "density": 1e-3, "time_step": 5e-5}
+    **{"radius": 0.9, "gap": 0.2, "gravity": 9810.0, "density": 1e-6, "time_step": 5e-5}
 }
 REGIMES: dict[str, Regime] = {
     "Chute1000": Regime(
@@ -245,7 +244,8 @@ REGIMES: dict[str, Regime] = {
     ),
     "Chute": Regime(
         "Chute (2024)",
-        {"grains": 3023, "across": 12, "layers": 12, "spheres": 0.0, "time_step": 2e-3},
+        {"grains": 3023, "across": 12, "layers": 12, "spheres": 0.0, "gaps": True}
+        | {"time_step": 2e-3},
         keep=50,
         steps=1000,
         every=5,
@@ -253,8 +253,8 @@ REGIMES: dict[str, Regime] = {
     ),
     "RollingChute": Regime(
         "Chute (rolling)",
-        {"grains": 1344, "across": 9, "layers": 9, "spheres": 0.0, "mu_r": 0.01}
-        | {"time_step": 2e-3},
+        {"grains": 1344, "across": 9, "layers": 9, "spheres": 0.0, "gaps": True}
+        | {"mu_r": 0.01, "time_step": 2e-3},
         keep=50,
         steps=1000,
         every=5,
@@ -270,9 +270,11 @@ REGIMES: dict[str, Regime] = {
     ),
     "SpheresPile": Regime(
         "SpheresPile (rolling)",
-        {"spheres": 250},
+        {"spheres": 250, "mu_r": 0.03, "time_step": 2.5e-4},
         keep=188,
-        steps=600,
+        steps=10000,
+        every=10,
+        way=Simulation(solver="auto", tol=1e-4, options={"time_limit": 5.0}),
         collection="fclib2024",
         scene="RollingSpheres",
     ),

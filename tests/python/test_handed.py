@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import math
 import shutil
 import subprocess
+import threading
+from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
 
@@ -445,10 +448,12 @@ def test_chosen_steps_are_hard_different_and_evenly_spread(tmp_path: Path) -> No
         # each second one is the one before it, with its contacts in another order
         order = (3, 1, 0, 2) if number % 2 else (0, 1, 2, 3)
         written(folder / "run-0", number, 1e-3 * (number // 2), order=order)
-    counts = {number: 5 if number < 10 else 100 for number in range(40)}
-    sweeps(folder, counts)
-    found = [state.number for state in rt444_states.candidates("BoxesStack", folder)]
-    assert found == list(range(10, 40, 2))
+    found = [state.number for state in rt444_states.distinct("BoxesStack", folder, 1)]
+    assert found == list(range(0, 40, 2))
+    thinned = [state.number for state in rt444_states.distinct("BoxesStack", folder, 5)]
+    assert thinned == list(range(0, 40, 5))
+    sweeps(folder, {number: 5 if number < 10 else 100 for number in found})
+    assert rt444_states.candidates("BoxesStack", folder) == list(range(10, 40, 2))
     path = rt444_states.choose("BoxesStack", folder, tmp_path / "out", "1", 5)
     states = trajectory.read(path)
     assert np.diff(states.step).tolist() == [6] * 4
@@ -461,12 +466,14 @@ def test_chosen_steps_are_hard_different_and_evenly_spread(tmp_path: Path) -> No
 def test_a_step_whose_w_is_not_the_engines_is_left_out(tmp_path: Path) -> None:
     folder = tmp_path / "BoxesStack"
     path = written(folder / "run-0", 3, 1e-3)
-    sweeps(folder, {3: 100})
-    assert [state.number for state in rt444_states.candidates("BoxesStack", folder)] == [3]
+    rt444_states.judge("BoxesStack", folder, 1, 300)
+    assert list(rt444_states.judged(folder)) == [3]
     with np.load(path) as data:
         values = dict(data)
     np.savez(path, **(values | {"W_data": 1.001 * values["W_data"]}))
-    assert not list(rt444_states.candidates("BoxesStack", folder))
+    rt444_states.sweeps_of(folder).unlink()
+    rt444_states.judge("BoxesStack", folder, 1, 300)
+    assert not rt444_states.judged(folder)
     with pytest.raises(SystemExit, match="0 different steps"):
         rt444_states.choose("BoxesStack", folder, tmp_path / "out", "1", 1)
     assert not list(tmp_path.rglob(f"*{trajectory.SUFFIX}"))
@@ -493,8 +500,26 @@ def test_judgement_goes_on_where_it_was(tmp_path: Path) -> None:
     for number in range(3):
         written(folder / "run-0", number, 1e-3 * number)
     sweeps(folder, {1: 77})
-    rt444_states.judge("BoxesStack", folder, 300)
+    rt444_states.judge("BoxesStack", folder, 1, 300)
     judged = rt444_states.judged(folder)
     assert judged[1] == 77
     assert sorted(judged) == [0, 1, 2]
     assert all(0 < judged[number] <= 300 for number in (0, 2))
+
+
+def test_a_simulation_gets_the_reactions_of_its_steps() -> None:
+    """Siconos asks in bytes; what comes back are reactions of the problem."""
+    position, velocity, contacts = some_states(3)
+    problem: Any = contacts.problem(2, position[2], velocity[2], H, fclib.ProblemInfo()).condense()
+    here, there = Pipe()
+    serving = threading.Thread(target=rt444_states.solves, args=(here,))
+    serving.start()
+    W = sp.csc_array(problem.W)
+    told = io.BytesIO()
+    np.savez(told, data=W.data, indices=W.indices, indptr=W.indptr, q=problem.q, mu=problem.mu)
+    there.send_bytes(told.getvalue())
+    r = np.frombuffer(there.recv_bytes())
+    there.close()
+    serving.join(timeout=10)
+    assert not serving.is_alive()
+    assert fclib.merit(problem, fclib.Solution(r=r, u=W @ r + problem.q)).natural <= 1e-8

@@ -1,16 +1,10 @@
 """A script of Siconos: a scene of RT-0444, with Bullet.
 
-    /usr/bin/python3 workshop/sets/_siconos_rt444.py SCENE END DRIVER [STEP.npz]
+    /usr/bin/python3 workshop/sets/_siconos_rt444.py SCENE END [STEP.npz]
 
-rt444_states.py records its steps. It begins where the recorded STEP begins, or at the start of the
-scene, and ends at END [s].
-
-What a step is solved with is chosen here, as no problem depends on it. There is one iteration of
-Newton's a step, and DRIVER is
-
-admm    of Siconos, to TOLERANCE, at most MOST_ITERATIONS, from the reactions of the step before.
-        From nine boxes above each other on it ends at 1e-5 or so: the stack wobbles, and falls
-fclib   the process that called this one solves (`rt444_states.solves`): the stack stands
+rt444_states.py records its steps, and solves them: Siconos' nsgs or ADMM end at 1e-5 or so from
+nine boxes above each other on, and the stack falls. It begins where the recorded STEP begins, or at
+the start of the scene, and ends at END [s]. There is one iteration of Newton's a step.
 """
 
 from __future__ import annotations
@@ -33,12 +27,10 @@ from _rt444_scenes import SCENES, Body  # type: ignore[import-not-found]
 from siconos.mechanics.collision.bullet import SiconosBulletOptions
 from siconos.mechanics.collision.tools import Contactor
 
-TOLERANCE = 1e-8
-MOST_ITERATIONS = 1000
 KINDS = {"box": "Box", "capsule": "Capsule"}
 
 
-def driven_by(connection: Any) -> Any:
+def solved_by(connection: Any) -> Any:
     """Makes friction problems that the process at the other end solves."""
 
     class Asked(kernel.FrictionContact):  # type: ignore[misc]
@@ -103,14 +95,10 @@ def make(file: str, bodies: list[Body], mu: float) -> None:
 
 
 def main() -> None:
-    name, end, driver, *step = sys.argv[1:]
+    name, end, *step = sys.argv[1:]
     scene = SCENES[name]
-    if driver == "fclib":
-        kernel.FrictionContact = driven_by(Connection(int(os.environ["FCLIB_SOLVES"])))
+    kernel.FrictionContact = solved_by(Connection(int(os.environ["FCLIB_SOLVES"])))
     bodies, start = beginning(name, Path(step[0]) if step else None)
-    options = kernel.solver_options_create(numerics.SICONOS_FRICTION_3D_ADMM)
-    options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = MOST_ITERATIONS
-    options.dparam[numerics.SICONOS_DPARAM_TOL] = TOLERANCE
     collision = SiconosBulletOptions()
     collision.contactBreakingThreshold = scene.near
     with tempfile.TemporaryDirectory() as folder:
@@ -125,7 +113,6 @@ def main() -> None:
                 bullet_options=collision,
                 Newton_options=kernel.SICONOS_TS_LINEAR,
                 Newton_max_iter=1,
-                solver_options=options,
                 verbose=False,
                 verbose_progress=False,
                 output_frequency=round(scene.end / scene.step) + 1,

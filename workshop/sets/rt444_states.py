@@ -1,18 +1,17 @@
 """The stored states of rt444: the authors' scenes in Siconos, and which of their steps are kept.
 
-    .venv/bin/python -m workshop.sets.rt444_states simulate BoxesStack --states DIR
-        [--driver fclib] [--every 1]
+    .venv/bin/python -m workshop.sets.rt444_states simulate BoxesStack --states DIR [--every 1]
     .venv/bin/python -m workshop.sets.rt444_states judge BoxesStack --states DIR
     .venv/bin/python -m workshop.sets.rt444_states choose BoxesStack --states DIR --out TR
     .venv/bin/python -m workshop.sets.rt444_states status --states DIR
 
 `_rt444_scenes.py` has the scenes. Each command can be killed, and goes on where it was.
 
-simulate    Siconos with Bullet, by fclib's recorder: each EVERY-th step as a file of
-            DIR/SCENE-DRIVER. The driver is what solves its steps
+simulate    Siconos with Bullet, by fclib's recorder: each EVERY-th step as a file of DIR/SCENE. Its
+            steps are solved here
 judge       DIR/SCENE-sweeps.csv: the sweeps of our nsgs to 1e-8, up to MOST, on each EVERY-th step
-            of all simulations that does not nearly equal one before (the same contacts, and W
-            within NEAR of its largest entry)
+            that does not nearly equal one before (the same contacts, and W within NEAR of its
+            largest entry)
 choose      of these the steps on which nsgs takes more than LEAST sweeps, as the authors' rule is:
             as many as the report has, evenly spread from a place that the seed draws
 
@@ -50,11 +49,6 @@ from fclib.simulate.rounding import exponent_of
 from workshop.sets._rt444_scenes import SCENES, Body, Scene
 
 RUN: Final = "run-"  # the folders of the steps that one command recorded
-# what solves the steps of a simulation, in words
-DRIVERS: Final = {
-    "fclib": "fclib's auto, to 1e-8",
-    "admm": "Siconos' ADMM, to 1e-8 or 1000 iterations, from the reactions of the step before",
-}
 SCRIPT: Final = Path(__file__).with_name("_siconos_rt444.py")
 PROBLEMS: Final = {"BoxesStack": 1514, "Capsules": 1705, "KaplasTower": 201}  # of the report
 # sweeps: a step that takes more may be kept. By the authors' scripts 80, or 100. But half of their
@@ -72,7 +66,7 @@ EXACT: Final = 1e-9
 AUTHORS: Final = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
 CHOSEN: Final = (
     "inertias of homogeneous bodies; boxes as Bullet's primitives; the distance from which Bullet"
-    " looks for contacts; one iteration of Newton's a step; tangents; what solves the steps: "
+    " looks for contacts; one iteration of Newton's a step, by fclib's auto to 1e-8; tangents"
 )
 # as the families here call them
 SIZES: Final[dict[str, dict[str, Any]]] = {
@@ -104,7 +98,7 @@ WORDS: Final = {
 # ---- simulation
 
 
-def simulate(name: str, folder: Path, every: int, end: float, driver: str) -> None:
+def simulate(name: str, folder: Path, every: int, end: float) -> None:
     """Go on from the last recorded step, up to the end [s]."""
     if word := siconos.missing():
         sys.exit(word)
@@ -120,7 +114,7 @@ def simulate(name: str, folder: Path, every: int, end: float, driver: str) -> No
     environment = os.environ | dict.fromkeys(siconos.THREADS, "1")
     environment["FCLIB_SOLVES"] = str(there.fileno())
     with subprocess.Popen(
-        [*command, name, str(end), driver, *start],
+        [*command, name, str(end), *start],
         stdout=subprocess.DEVNULL,
         env=environment,
         pass_fds=[there.fileno()],
@@ -149,13 +143,6 @@ def solves(connection: Any) -> None:
         problem = fclib.LocalProblem(spacedim=3, W=W, q=told["q"], mu=told["mu"])
         found = fclib.solve(problem, tol=TOLERANCE, time_limit=DRIVEN)
         connection.send_bytes(np.ascontiguousarray(found.solution.r).tobytes())
-
-
-def folders(states: Path, name: str) -> list[Path]:
-    """The simulations of a scene."""
-    return [
-        states / f"{name}-{driver}" for driver in DRIVERS if (states / f"{name}-{driver}").is_dir()
-    ]
 
 
 def files(folder: Path) -> dict[int, Path]:
@@ -285,42 +272,40 @@ def apart(state: State, problem: Any) -> tuple[float, float]:
 # ---- choice
 
 
-def judged(states: Path, name: str) -> dict[tuple[str, int], int]:
-    """The sweeps of the steps that were judged, by their simulation and number."""
-    path = table(states, name)
+def judged(folder: Path) -> dict[int, int]:
+    """The sweeps of the steps that were judged."""
+    path = sweeps_of(folder)
     if not path.is_file():
         return {}
     with path.open(newline="") as file:
-        rows = csv.DictReader(file)
-        return {(row["simulation"], int(row["step"])): int(row["sweeps"]) for row in rows}
+        return {int(row["step"]): int(row["sweeps"]) for row in csv.DictReader(file)}
 
 
-def table(states: Path, name: str) -> Path:
-    """The file of the sweeps of a scene."""
-    return states / f"{name}-sweeps.csv"
+def sweeps_of(folder: Path) -> Path:
+    """The table of a scene's steps and their sweeps."""
+    return folder / "sweeps.csv"
 
 
-def distinct(states: Path, name: str, every: int) -> Iterator[tuple[str, State]]:
-    """Of each simulation one recorded step in so many, but for those that nearly equal another."""
+def distinct(name: str, folder: Path, every: int) -> Iterator[State]:
+    """One recorded step in so many, but for those that nearly equal another."""
     bodies = SCENES[name].bodies()
     kept: dict[bytes, list[tuple[Any, Any]]] = {}
-    for folder in folders(states, name):
-        for number, path in list(files(folder).items())[::every]:
-            state = State.read(number, path, bodies)
-            # contacts in the order of their bodies and places: another step may list them otherwise
-            order = np.lexsort((*state.told.point.T, *state.body.T))
-            places = (3 * order[:, None] + np.arange(3)).ravel()
-            W = sp.csr_array(state.told.W)[places][:, places]
-            W.sort_indices()
-            own = W.diagonal()
-            others = kept.setdefault(state.body[order].tobytes(), [])
-            if any(
-                np.abs(own - diagonal).max() <= NEAR * own.max() and near(W, other)
-                for diagonal, other in reversed(others)
-            ):
-                continue
-            others.append((own, W))
-            yield folder.name, state
+    for number, path in list(files(folder).items())[::every]:
+        state = State.read(number, path, bodies)
+        # contacts in the order of their bodies and places: another step may list them otherwise
+        order = np.lexsort((*state.told.point.T, *state.body.T))
+        places = (3 * order[:, None] + np.arange(3)).ravel()
+        W = sp.csr_array(state.told.W)[places][:, places]
+        W.sort_indices()
+        own = W.diagonal()
+        others = kept.setdefault(state.body[order].tobytes(), [])
+        if any(
+            np.abs(own - diagonal).max() <= NEAR * own.max() and near(W, other)
+            for diagonal, other in reversed(others)
+        ):
+            continue
+        others.append((own, W))
+        yield state
 
 
 def near(W: Any, other: Any) -> bool:
@@ -328,14 +313,14 @@ def near(W: Any, other: Any) -> bool:
     return bool(abs(W - other).max() <= NEAR * abs(other).max())
 
 
-def judge(states: Path, name: str, every: int, most: int) -> None:
+def judge(name: str, folder: Path, every: int, most: int) -> None:
     """Append the sweeps of each distinct step that is not judged yet."""
-    scene, known = SCENES[name], judged(states, name)
-    path = table(states, name)
+    scene, known = SCENES[name], judged(folder)
+    path = sweeps_of(folder)
     if not known:
-        path.write_text("simulation,step,contacts,dof,sweeps\n", encoding="utf-8")
-    for simulation, state in distinct(states, name, every):
-        if (simulation, state.number) in known:
+        path.write_text("step,contacts,dof,sweeps\n", encoding="utf-8")
+    for state in distinct(name, folder, every):
+        if state.number in known:
             continue
         problem = problem_of(state, scene)
         if not apart(state, problem)[0] <= EXACT:
@@ -344,13 +329,12 @@ def judge(states: Path, name: str, every: int, most: int) -> None:
             problem.condense(), "nsgs", tol=TOLERANCE, max_iterations=most, time_limit=math.inf
         )
         with path.open("a", encoding="utf-8") as file:
-            row = simulation, state.number, problem.nc, problem.n, found.iterations
-            file.write(",".join(map(str, row)) + "\n")
+            file.write(f"{state.number},{problem.nc},{problem.n},{found.iterations}\n")
 
 
-def candidates(states: Path, name: str) -> list[tuple[str, int]]:
-    """The simulations and steps that nsgs takes more than LEAST sweeps for."""
-    return [key for key, count in judged(states, name).items() if count > LEAST[name]]
+def candidates(name: str, folder: Path) -> list[int]:
+    """The steps that nsgs takes more than LEAST sweeps for, in their order."""
+    return sorted(step for step, count in judged(folder).items() if count > LEAST[name])
 
 
 def spread(found: list[Any], count: int, seed: int) -> list[Any]:
@@ -363,19 +347,17 @@ def spread(found: list[Any], count: int, seed: int) -> list[Any]:
 def choose(name: str, folder: Path, out: Path, version: str, count: int) -> Path:
     """Write the trajectory of the chosen steps."""
     scene = SCENES[name]
-    found = candidates(folder, name)
+    found = candidates(name, folder)
     if len(found) < count:
         raise SystemExit(
             f"{name}: {len(found)} different steps take nsgs more than {LEAST[name]} sweeps, and"
             f" {count} are asked for: simulate more of it, or each step (--every 1), and judge them"
         )
-    recorded = {own.name: files(own) for own in folders(folder, name)}
-    kept = spread(found, count, SEED)
+    recorded = files(folder)
     states = [
-        State.read(number, recorded[simulation][number], scene.bodies())
-        for simulation, number in kept
+        State.read(number, recorded[number], scene.bodies())
+        for number in spread(found, count, SEED)
     ]
-    used = [words for driver, words in DRIVERS.items() if f"{name}-{driver}" in dict(kept)]
     worst = np.max([apart(state, problem_of(state, scene)) for state in states], axis=0)
     exponent = exponent_for(scene)
     position, velocity, contacts = stored(states, scene, exponent)
@@ -403,7 +385,7 @@ def choose(name: str, folder: Path, out: Path, version: str, count: int) -> Path
                 "version": siconos.version().partition(" in ")[0],
             },
             "script": f"FrictionalContactLibrary/fclib-scripts, {scene.script}",
-            "chosen here": CHOSEN + "; or ".join(used),
+            "chosen here": CHOSEN,
             "settings": {
                 "fclib": fclib.__version__,
                 "kept": f"nsgs to {TOLERANCE:g} takes more than {LEAST[name]} sweeps;"
@@ -441,13 +423,12 @@ def choose(name: str, folder: Path, out: Path, version: str, count: int) -> Path
 def status(states: Path) -> None:
     """How far each scene is."""
     for name, scene in SCENES.items():
-        for folder in folders(states, name):
-            found = files(folder)
-            last = max(found, default=0) * scene.step
-            print(f"{folder.name}: {last:.2f} of {scene.end:g} s, {len(found)} steps recorded")
+        folder = states / name
+        found = files(folder)
         print(
-            f"{name}: {len(judged(states, name))} different steps judged,"
-            f" {len(candidates(states, name))} take more than {LEAST[name]} sweeps;"
+            f"{name}: {max(found, default=0) * scene.step:.2f} of {scene.end:g} s,"
+            f" {len(found)} steps recorded, {len(judged(folder))} different ones judged,"
+            f" {len(candidates(name, folder))} of them take more than {LEAST[name]} sweeps;"
             f" wanted {PROBLEMS[name]}"
         )
 
@@ -460,7 +441,6 @@ def main() -> None:
     parser.add_argument("--states", type=Path, required=True, help="folder of recorded steps")
     parser.add_argument("--every", type=int, default=1, help="one step in so many")
     parser.add_argument("--end", type=float, help="of a simulation [s]; by default the scene's")
-    parser.add_argument("--driver", choices=list(DRIVERS), default="fclib")
     parser.add_argument("--most", type=int, default=MOST, help="sweeps of a judgement")
     parser.add_argument("--out", type=Path, help="folder of trajectories")
     parser.add_argument("--version", default="1")
@@ -470,13 +450,13 @@ def main() -> None:
         return status(own.states)
     if own.scene is None or (own.command == "choose" and own.out is None):
         parser.error("name a scene, and a folder for choose (--out)")
+    folder = own.states / own.scene
     if own.command == "simulate":
-        folder = own.states / f"{own.scene}-{own.driver}"
-        simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end, own.driver)
+        simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end)
     elif own.command == "judge":
-        judge(own.states, own.scene, own.every, own.most)
+        judge(own.scene, folder, own.every, own.most)
     else:
-        choose(own.scene, own.states, own.out, own.version, own.count or PROBLEMS[own.scene])
+        choose(own.scene, folder, own.out, own.version, own.count or PROBLEMS[own.scene])
     return None
 
 

@@ -394,6 +394,71 @@ def test_inertia_of_a_capsule_is_that_of_its_points() -> None:
     np.testing.assert_allclose(body.inertia, expected, rtol=0.02)
 
 
+# ---- what is stored
+
+
+@pytest.mark.parametrize("name", sorted(rt444_states.PROBLEMS))
+def test_stored_problems_follow_from_bodies_and_contacts(name: str) -> None:
+    """H and w of ten problems from their tables, M and f from masses and velocities; by NumPy."""
+    path = published.path_of(f"rt444/{name}", set_index.version_of(f"rt444/{name}"))
+    states = None if path is None else trajectory.read(path)
+    if states is None or states.handed is None:
+        pytest.skip("no states of another engine are stored here")
+    scene = _rt444_scenes.SCENES[name]
+    h, theta = scene.step, scene.theta
+    for place in np.linspace(0, len(states) - 1, 10).astype(int).tolist():
+        problem: Any = states.problem(place).problem
+        contacts, bodies = problem.contacts, problem.bodies
+        moving = np.flatnonzero(bodies.moves)
+        touched = np.intersect1d(contacts.body, moving)
+        assert problem.n == 6 * len(touched)
+        twist = states.velocity[place].reshape(-1, 6)[np.searchsorted(moving, touched)]
+        H, M, f = np.zeros((problem.n, problem.m)), np.zeros((problem.n, problem.n)), []
+        for c in range(problem.nc):
+            N, T1 = contacts.normal[c], contacts.tangent[c]
+            frame = np.stack((N, T1, np.cross(N, T1)), axis=1)
+            for body, sign in zip(contacts.body[c], (-1, 1), strict=True):
+                if body in touched:
+                    first = 6 * int(np.searchsorted(touched, body))
+                    R = rotations(bodies.turn[body][None])[0]
+                    arm = contacts.point[c] - bodies.place[body]
+                    columns = slice(3 * c, 3 * c + 3)
+                    H[first : first + 3, columns] += sign * frame
+                    H[first + 3 : first + 6, columns] += sign * R.T @ cross(arm) @ frame
+        for i, (body, v) in enumerate(zip(touched, twist, strict=True)):
+            solid, omega = states.handed.solids[body], v[3:]
+            inertia = np.diag(inertia_of(solid))
+            own = np.zeros((6, 6))
+            own[:3, :3] = solid.mass * np.eye(3)
+            own[3:, 3:] = inertia + h * theta * (cross(omega) @ inertia - cross(inertia @ omega))
+            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = own
+            pushed = own @ v
+            pushed[2] -= h * solid.mass * 9.80665
+            pushed[3:] -= h * np.cross(omega, inertia @ omega)
+            f.append(pushed)
+        for found, expected in (
+            (dense(problem.H), H),
+            (dense(problem.M), M),
+            (np.asarray(problem.f), np.concatenate(f)),
+        ):
+            assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+        np.testing.assert_array_equal(problem.w, 0)
+        np.testing.assert_array_equal(problem.mu, scene.mu)
+
+
+def inertia_of(solid: handed.Solid) -> list[float]:
+    """Of a homogeneous box or capsule, in its body's axes."""
+    if solid.kind == "box":
+        x, y, z = np.square(solid.size) * solid.mass / 3
+        return [y + z, x + z, x + y]
+    radius, half = solid.size
+    share = 3 * half / (3 * half + 2 * radius)  # of the cylinder; it lies along y
+    along = radius**2 * (0.5 * share + 0.4 * (1 - share))
+    caps = 0.4 * radius**2 + half**2 + 0.75 * radius * half
+    across = share * (radius**2 / 4 + half**2 / 3) + (1 - share) * caps
+    return [solid.mass * across, solid.mass * along, solid.mass * across]
+
+
 # ---- the choice
 
 

@@ -89,9 +89,7 @@ def test_ours_stand_under_the_published_files(
         ("*Local/other*", "sweeps"),
     ]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == [
-        f"{PUBLISHED}-{label}.png" for label in ("contacts", "sweeps")
-    ]
+    assert names == [f"{PUBLISHED}-{label}.png" for label in ("contacts", "sweeps")]
 
 
 def test_a_list_without_the_columns_is_named(

@@ -455,7 +455,11 @@ DEEPER = {
     "Chute4000": 0.5,
 }
 with collection_table.PUBLISHED.open(newline="") as file:
-    SIZES = {row["ours"]: row for row in csv.DictReader(file) if row["ours"].startswith("rr9118/")}
+    SIZES = {
+        row["ours"]: row
+        for row in csv.DictReader(file)
+        if row["ours"].startswith(("rr9118/", "fclib2024/"))
+    }
 # ends that other ends exclude, or that the page explains
 NOT_MET = {
     "rr9118/CubesH8": ("density",),

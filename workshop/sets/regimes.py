@@ -140,7 +140,7 @@ REGIMES: dict[str, Regime] = {
         "Capsules",
         {"gaps": True, "activation": 0.0, "margin": 0.04, "gyroscopic": True},
         keep=40,
-        states="rt444/Capsules",
+        states="rr9118/Capsules",
         fill=True,
         version="2",
     ),

@@ -62,7 +62,7 @@ SEED: Final = 0
 GRAVITY: Final = 9.80665  # [m/s^2] Siconos' own
 # W that follows from the states, before they are rounded, against Siconos' own: the normal
 # components, relative to the largest entry
-EXACT: Final = 1e-9
+EXACT: Final = 1e-8
 AUTHORS: Final = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
 CHOSEN: Final = (
     "inertias of homogeneous bodies; boxes as Bullet's primitives; the distance from which Bullet"

@@ -6,6 +6,7 @@ import dataclasses
 import io
 import math
 import shutil
+import signal
 import subprocess
 import threading
 from multiprocessing import Pipe
@@ -588,3 +589,29 @@ def test_a_simulation_gets_the_reactions_of_its_steps() -> None:
     serving.join(timeout=10)
     assert not serving.is_alive()
     assert fclib.merit(problem, fclib.Solution(r=r, u=W @ r + problem.q)).natural <= 1e-8
+
+
+def test_siconos_goes_on_from_a_step_with_these_reactions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The lowest box rests; its reactions in Siconos' steps are solutions to the tolerance."""
+    if siconos.missing():
+        pytest.skip("needs Siconos")
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    folder = tmp_path / "BoxesStack"
+    written(folder / "run-0", 100, 0.0, first=100)
+    h = _rt444_scenes.SCENES["BoxesStack"].step
+    rt444_states.simulate("BoxesStack", folder, 1, 106 * h)
+    found = rt444_states.files(folder)
+    assert len(found) >= 4
+    assert max(found) == 105
+    for number in range(103, 106):
+        told = _siconos.told(found[number])
+        with np.load(found[number]) as data:
+            r, mu = data["r"], data["mu"]
+        problem = fclib.LocalProblem(spacedim=3, W=told.W, q=told.q, mu=mu)
+        result = fclib.Solution(r=r, u=told.W @ r + told.q)
+        assert fclib.merit(problem, result).natural <= 1e-8
+        # the box weighs on the ground, and nothing else does yet
+        weight = rt444_states.GRAVITY * h
+        assert np.reshape(r, (-1, 3))[:, 0].sum() == pytest.approx(weight, rel=1e-6)

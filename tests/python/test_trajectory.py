@@ -635,6 +635,7 @@ def test_the_stack_of_boxes_stands_and_its_ground_carries_it() -> None:
     path = published.path_of("rt444/BoxesStack", set_index.version_of("rt444/BoxesStack"))
     assert path is not None
     states = trajectory.read(path)
+    assert states.handed is not None
     count, edge = states.scene.parameters["boxes"], states.scene.parameters["size"]
     places = states.position.reshape(len(states), count, 7)[:, :, :3]
     above = np.arange(count) * edge + 0.5 * edge

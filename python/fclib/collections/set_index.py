@@ -4,7 +4,8 @@ Every family names its set; its problems are SET/FAMILY/NUMBER. Two kinds of set
 problems of others:
 
 extended      all families that are newer than RT-0444
-standard, hard, tiny, rr9118    chosen problems, in folders of their own; data/ has the lists
+standard, hard, tiny, rr9118, fclib2024     chosen problems, in folders of their own; data/ has the
+                                            lists
 
 A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
 stored, its problems never change (`published.py`). A list that has grown notes the version in which
@@ -30,7 +31,7 @@ SHIPPED = ("tiny",)  # sets whose problems need no build
 
 # name, version, description; a set that a family names and that is missing here has version 1
 SETS: dict[str, tuple[str, str]] = {
-    "rt444": ("5", "the four families of RT-0444"),
+    "rt444": ("1", "the four families of RT-0444; two of the scenes in Siconos"),
     "granular": ("7", "grains that fall, flow and are pressed"),
     "rolling": ("6", "grains with rolling friction"),
     "masonry": ("5", "blocks laid without mortar"),
@@ -50,6 +51,7 @@ SETS: dict[str, tuple[str, str]] = {
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
     "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
     "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
+    "fclib2024": ("1", "families in the sizes of the library's sets of 2024"),
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("17", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
@@ -59,7 +61,7 @@ SETS: dict[str, tuple[str, str]] = {
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
     *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "decks", "rr9118"),
-    *("quasistatic", "laws", "assembly", "flows"),
+    *("fclib2024", "quasistatic", "laws", "assembly", "flows"),
 )
 
 

@@ -319,14 +319,16 @@ struct Block {
 
 // ---- linear equations
 
-/// d times the inverse of a block of 3, from its columns.
+/// A block of 3, inverted: the inverse is d times the entries i. `block` has `next` entries from a row to the
+/// next.
 struct Inverse {
   double i00, i01, i02, i10, i11, i12, i20, i21, i22, d;
 
-  FCLIB_LANES Inverse(const double* c0, const double* c1, const double* c2) {
-    const double a00 = c0[0], a10 = c0[1], a20 = c0[2];
-    const double a01 = c1[0], a11 = c1[1], a21 = c1[2];
-    const double a02 = c2[0], a12 = c2[1], a22 = c2[2];
+  FCLIB_LANES Inverse(const double* row0, int next) {
+    const double *row1 = row0 + next, *row2 = row1 + next;
+    const double a00 = row0[0], a01 = row0[1], a02 = row0[2];
+    const double a10 = row1[0], a11 = row1[1], a12 = row1[2];
+    const double a20 = row2[0], a21 = row2[1], a22 = row2[2];
     i00 = a11 * a22 - a12 * a21;
     i01 = a02 * a21 - a01 * a22;
     i02 = a01 * a12 - a02 * a11;
@@ -356,13 +358,13 @@ FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
   const int parts = Group::size / rows;
   for (int k = 0; k < n; k += 3) {
     const double *c0 = S + ld * k, *c1 = c0 + ld, *c2 = c1 + ld;
-    const Inverse of(c0 + k, c1 + k, c2 + k);
+    const Inverse of(c0 + k, ld);  // of the transposed block
     for (int i = row; i < n; i += rows) {
       if (i >= k && i < k + 3) continue;
       const double x0 = c0[i] * of.d, x1 = c1[i] * of.d, x2 = c2[i] * of.d;
-      const double f0 = x0 * of.i00 + x1 * of.i10 + x2 * of.i20;
-      const double f1 = x0 * of.i01 + x1 * of.i11 + x2 * of.i21;
-      const double f2 = x0 * of.i02 + x1 * of.i12 + x2 * of.i22;
+      const double f0 = x0 * of.i00 + x1 * of.i01 + x2 * of.i02;
+      const double f1 = x0 * of.i10 + x1 * of.i11 + x2 * of.i12;
+      const double f2 = x0 * of.i20 + x1 * of.i21 + x2 * of.i22;
       double* x = S + ld * (k + 3 + part);
       for (int j = k + 3 + part; j <= n; j += parts, x += ld * parts) {
         x[i] -= f0 * x[k] + f1 * x[k + 1] + f2 * x[k + 2];
@@ -372,12 +374,11 @@ FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
   }
   double* b = S + ld * n;
   for (int k = 3 * group.lane(); k < n; k += 3 * Group::size) {
-    const double* c = S + ld * k + k;
-    const Inverse of(c, c + ld, c + 2 * ld);
+    const Inverse of(S + ld * k + k, ld);
     const double b0 = b[k] * of.d, b1 = b[k + 1] * of.d, b2 = b[k + 2] * of.d;
-    b[k] = of.i00 * b0 + of.i01 * b1 + of.i02 * b2;
-    b[k + 1] = of.i10 * b0 + of.i11 * b1 + of.i12 * b2;
-    b[k + 2] = of.i20 * b0 + of.i21 * b1 + of.i22 * b2;
+    b[k] = of.i00 * b0 + of.i10 * b1 + of.i20 * b2;
+    b[k + 1] = of.i01 * b0 + of.i11 * b1 + of.i21 * b2;
+    b[k + 2] = of.i02 * b0 + of.i12 * b1 + of.i22 * b2;
   }
   group.sync();
 }
@@ -392,15 +393,26 @@ FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
 //
 // The contacts of a lane are lane, lane + size, ...
 
+/// The number of contacts of the present problem; `Fixed`, if all problems have that many.
+template <int Fixed>
+struct Count {
+  static constexpr int nc = Fixed;
+  FCLIB_LANES void set(int) {}
+};
+template <>
+struct Count<0> {
+  int nc = 0;
+  FCLIB_LANES void set(int contacts) { nc = contacts; }
+};
+
 /// What all systems keep.
-template <class Law_, class Group_>
-struct Shared {
+template <class Law_, class Group_, int Fixed = 0>
+struct Shared : Count<Fixed> {
   using Law = Law_;
   using Group = Group_;
   static constexpr int D = Law::dim;
 
   Group group;
-  int nc = 0;       // of the present problem
   double* x;        // (D nc) what contacts tell one another
   double* slopes;   // (D D nc) D of each contact, by rows
 
@@ -470,7 +482,7 @@ struct Dense : Shared<Law, Group> {
                         double (&size)[Own]) {
     bool bad = false;
     if (mine) {
-      nc = contacts;
+      this->set(contacts);
       const int m = D * nc;
       W = copy != nullptr ? copy : given.W;
       for (int k = group.lane(); k < m * m; k += Group::size) {
@@ -682,7 +694,7 @@ struct Bodies : Shared<Law, Group> {
                         double (&size)[Own]) {
     bool bad = false;
     if (mine) {
-      nc = contacts;
+      this->set(contacts);
       FCLIB_UNROLL
       for (int o = 0; o < Own; ++o) {
         const int a = group.lane() + o * Group::size;
@@ -695,9 +707,8 @@ struct Bodies : Shared<Law, Group> {
         int found = 0;
         for (int d = 0; d < nv; ++d) {
           const double inverse = given.inverse[d];
-          bad = bad || !(inverse >= 0) || !is_finite(inverse);
           const double velocity = given.velocity != nullptr ? given.velocity[d] : 0.0;
-          const double root = square_root(inverse);
+          bad = bad || !(inverse >= 0) || !is_finite(inverse);
           double here[D];
           bool any = false;
           FCLIB_UNROLL
@@ -711,6 +722,7 @@ struct Bodies : Shared<Law, Group> {
             bad = bad || any;
             continue;
           }
+          const double root = square_root(inverse);
           FCLIB_UNROLL
           for (int k = 0; k < D; ++k) B[a * stride + k * width + found] = here[k] * root;
           column[a * width + found++] = d;
@@ -817,7 +829,7 @@ struct Bodies : Shared<Law, Group> {
     group.sync();
   }
 
-  /// K = I + B^T D B. Each lane has its rows, or a part of a row.
+  /// K = I + B^T D B. Each lane has its rows; if there are more lanes, each has some columns of a row.
   FCLIB_LANES void fill(int n) {
     int rows = Group::size;
     while (rows / 2 >= n) rows /= 2;
@@ -837,13 +849,222 @@ struct Bodies : Shared<Law, Group> {
           FCLIB_UNROLL
           for (int k = 0; k < D; ++k) t[l] += b[k * width + own] * slope[D * k + l];
         }
-        for (int j = part; j < width; j += parts) {
+        for (int j = 0; j < width; ++j) {
           const int d = column[a * width + j];
           if (d == nv) break;
+          if ((d & (parts - 1)) != part) continue;
           double sum = 0;
           FCLIB_UNROLL
           for (int l = 0; l < D; ++l) sum += t[l] * b[l * width + j];
           K[i + ld * d] += sum;
+        }
+      }
+    }
+    group.sync();
+  }
+};
+
+/// J of problems with few coordinates, `Nv`, all of which a contact may touch. A lane keeps its rows of K
+/// in registers; the rows that are eliminated go through shared memory.
+template <class Law, class Group, int Nv, int Fixed = 0>
+struct FewCoordinates : Shared<Law, Group, Fixed> {
+  using Base = Shared<Law, Group, Fixed>;
+  using Base::D;
+  using Base::group;
+  using Base::nc;
+  using Base::slopes;
+  using Base::x;
+  using Given = typename Bodies<Law, Group>::Given;
+
+  static constexpr int N = padded(Nv);    // the columns of B from Nv on are 0
+  static constexpr int together = 3;      // columns that are read at once; more take registers
+  static constexpr int stride = (D * N) | 1;  // of a contact in B, as in Bodies
+  static constexpr int rows = (N + Group::size - 1) / Group::size;  // of a lane
+
+  double* B;       // (D x N) of each contact
+  double* v;       // (N)
+  double* pivots;  // (N x N + 1), by rows: each as it is when it is eliminated
+
+  FCLIB_LANES static constexpr int room(int most_contacts) {
+    return Base::room(most_contacts) + stride * most_contacts + N + N * (N + 1);
+  }
+  FCLIB_LANES void place(double* at, int most_contacts) {
+    B = Base::place(at, most_contacts);
+    v = B + stride * most_contacts;
+    pivots = v + N;
+  }
+
+  template <int Own>
+  FCLIB_LANES bool take(bool mine, int contacts, const Given& given, double (&q)[Own][D],
+                        double (&size)[Own]) {
+    bool bad = false;
+    if (mine) {
+      this->set(contacts);
+      FCLIB_UNROLL
+      for (int o = 0; o < Own; ++o) {
+        const int a = group.lane() + o * Group::size;
+        if (a >= nc) break;
+        size[o] = 0;
+        FCLIB_UNROLL
+        for (int k = 0; k < D; ++k) q[o][k] = given.q != nullptr ? given.q[D * a + k] : 0.0;
+        for (int first = 0; first < N; first += together) {
+          double here[together][D], inverse[together], velocity[together];
+          FCLIB_UNROLL
+          for (int c = 0; c < together; ++c) {
+            const int d = first + c;
+            inverse[c] = d < Nv ? given.inverse[d] : 0.0;
+            velocity[c] = d < Nv && given.velocity != nullptr ? given.velocity[d] : 0.0;
+            FCLIB_UNROLL
+            for (int k = 0; k < D; ++k) here[c][k] = d < Nv ? given.J[(D * a + k) * Nv + d] : 0.0;
+          }
+          FCLIB_UNROLL
+          for (int c = 0; c < together; ++c) {
+            const double root = square_root(inverse[c]);
+            bad = bad || !(inverse[c] >= 0) || !is_finite(inverse[c]);
+            FCLIB_UNROLL
+            for (int k = 0; k < D; ++k) {
+              q[o][k] += here[c][k] * velocity[c];
+              size[o] += here[c][k] * here[c][k] * inverse[c] / D;
+              B[a * stride + k * N + first + c] = here[c][k] * root;
+            }
+          }
+        }
+        FCLIB_UNROLL
+        for (int k = 0; k < D; ++k) bad = bad || !is_finite(q[o][k]);
+        bad = bad || !is_finite(size[o]);
+      }
+    }
+    group.sync();
+    return bad;
+  }
+
+  /// y = B from, of one contact.
+  FCLIB_LANES void spread(int a, const double* from, double* y) const {
+    FCLIB_UNROLL
+    for (int k = 0; k < D; ++k) {
+      y[k] = 0;
+      FCLIB_UNROLL
+      for (int d = 0; d < N; ++d) y[k] += B[a * stride + k * N + d] * from[d];
+    }
+  }
+
+  template <int Own>
+  FCLIB_LANES void product(const double (&own)[Own][D], double (&y)[Own][D]) {
+    FCLIB_UNROLL
+    for (int o = 0; o < Own; ++o) {
+      const int a = group.lane() + o * Group::size;
+      if (a >= nc) break;
+      FCLIB_UNROLL
+      for (int k = 0; k < D; ++k) x[D * a + k] = own[o][k];
+    }
+    group.sync();
+    FCLIB_UNROLL
+    for (int row = 0; row < rows; ++row) {
+      const int d = group.lane() + row * Group::size;
+      if (d >= N) break;
+      double sum = 0;
+      for (int a = 0; a < nc; ++a) {
+        FCLIB_UNROLL
+        for (int k = 0; k < D; ++k) sum += B[a * stride + k * N + d] * x[D * a + k];
+      }
+      v[d] = sum;
+    }
+    group.sync();
+    FCLIB_UNROLL
+    for (int o = 0; o < Own; ++o) {
+      const int a = group.lane() + o * Group::size;
+      if (a < nc) spread(a, v, y[o]);
+    }
+    group.sync();
+  }
+
+  template <int Own>
+  FCLIB_LANES void solve(double (&dp)[Own][D]) {
+    // K = I + B^T D B, and -B^T F behind it
+    double K[rows][N + 1];
+    FCLIB_UNROLL
+    for (int row = 0; row < rows; ++row) {
+      const int i = group.lane() + row * Group::size;
+      FCLIB_UNROLL
+      for (int j = 0; j <= N; ++j) K[row][j] = i == j ? 1.0 : 0.0;
+    }
+    for (int a = 0; a < nc; ++a) {
+      const double* slope = slopes + D * D * a;
+      double t[rows][D];
+      FCLIB_UNROLL
+      for (int row = 0; row < rows; ++row) {
+        const int i = group.lane() + row * Group::size;
+        FCLIB_UNROLL
+        for (int l = 0; l < D; ++l) t[row][l] = 0;
+        FCLIB_UNROLL
+        for (int k = 0; k < D; ++k) {
+          const double b = i < N ? B[a * stride + k * N + i] : 0.0;
+          K[row][N] -= b * x[D * a + k];
+          FCLIB_UNROLL
+          for (int l = 0; l < D; ++l) t[row][l] += b * slope[D * k + l];
+        }
+      }
+      if (!group.anyone(slope[0] != 0)) continue;
+      FCLIB_UNROLL
+      for (int j = 0; j < N; ++j) {
+        FCLIB_UNROLL
+        for (int l = 0; l < D; ++l) {
+          const double b = B[a * stride + l * N + j];
+          FCLIB_UNROLL
+          for (int row = 0; row < rows; ++row) K[row][j] += t[row][l] * b;
+        }
+      }
+    }
+    eliminate_rows(K);
+    FCLIB_UNROLL
+    for (int row = 0; row < rows; ++row) {
+      const int i = group.lane() + row * Group::size;
+      if (i < N) v[i] = K[row][N];
+    }
+    group.sync();
+    FCLIB_UNROLL
+    for (int o = 0; o < Own; ++o) {
+      const int a = group.lane() + o * Group::size;
+      if (a >= nc) break;
+      double y[D];
+      spread(a, v, y);
+      FCLIB_UNROLL
+      for (int k = 0; k < D; ++k) {
+        dp[o][k] = -x[D * a + k];
+        FCLIB_UNROLL
+        for (int l = 0; l < D; ++l) dp[o][k] -= slopes[D * D * a + D * k + l] * y[l];
+      }
+    }
+    group.sync();
+  }
+
+  /// As `eliminate`, but the rows of a block become rows of the identity at once.
+  FCLIB_LANES void eliminate_rows(double (&K)[rows][N + 1]) const {
+    FCLIB_UNROLL
+    for (int k = 0; k < N; k += 3) {
+      FCLIB_UNROLL
+      for (int p = k; p < k + 3; ++p) {
+        if (group.lane() != p % Group::size) continue;
+        FCLIB_UNROLL
+        for (int j = k; j <= N; ++j) pivots[p * (N + 1) + j] = K[p / Group::size][j];
+      }
+      group.sync();
+      const double* block = pivots + k * (N + 1);
+      const Inverse of(block + k, N + 1);
+      FCLIB_UNROLL
+      for (int row = 0; row < rows; ++row) {
+        const int i = group.lane() + row * Group::size;
+        const bool pivot = i >= k && i < k + 3;
+        const double x0 = of.d * (pivot ? -double(i == k) : K[row][k]);
+        const double x1 = of.d * (pivot ? -double(i == k + 1) : K[row][k + 1]);
+        const double x2 = of.d * (pivot ? -double(i == k + 2) : K[row][k + 2]);
+        const double f0 = x0 * of.i00 + x1 * of.i10 + x2 * of.i20;
+        const double f1 = x0 * of.i01 + x1 * of.i11 + x2 * of.i21;
+        const double f2 = x0 * of.i02 + x1 * of.i12 + x2 * of.i22;
+        FCLIB_UNROLL
+        for (int j = k + 3; j <= N; ++j) {
+          K[row][j] = (pivot ? 0.0 : K[row][j]) - (f0 * block[j] + f1 * block[N + 1 + j] +
+                                                   f2 * block[2 * (N + 1) + j]);
         }
       }
     }

@@ -88,9 +88,7 @@ def solve_batch(
         jacobian: (count, m, coordinates) instead of W: W = J M^-1 J^T. If ``contacts`` is given:
             (m of all problems, coordinates).
         inverse_mass: M^-1 of the jacobian's coordinates: (coordinates,) or (count, coordinates) if
-            it is diagonal, or (coordinates, coordinates) or (count, coordinates, coordinates). A
-            square array of two dimensions is a full matrix, unless count is its size: then its rows
-            are the diagonals of the problems.
+            it is diagonal, or (count, coordinates, coordinates).
         velocity: (count, coordinates) free velocities of the bodies: q = J velocity, and what is
             given as q besides.
         spacedim: 3, or 2 for planar problems.
@@ -229,13 +227,12 @@ def _of_bodies(
     nv = matrix.shape[-1]
     count = len(matrix) if contacts is None else len(contacts)
     inverse = _floats("inverse_mass", inverse_mass)
-    shapes = [(nv,), (count, nv), (nv, nv), (count, nv, nv)]
+    shapes = [(nv,), (count, nv), (count, nv, nv)]
     if inverse.shape not in shapes:
         raise _core.ProblemError(
             f"inverse_mass: has the shape {inverse.shape}, expected one of {shapes}"
         )
-    of_each = inverse.shape == shapes[1] or inverse.ndim == 3
-    full = inverse.shape not in shapes[:2]
+    of_each, full = inverse.ndim > 1, inverse.ndim == 3
     moving = None if velocity is None else _shaped("velocity", velocity, (count, nv))
     sizes = None if contacts is None else spacedim * np.asarray(contacts)
     rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])

@@ -16,8 +16,8 @@
 namespace small = fclib::proximal_small;
 
 using Law = small::Law<SPACEDIM>;
-#if LANES == 1
-using Group = small::Serial;
+#ifndef __CUDACC__
+using Group = small::Serial;  // for tests
 constexpr int threads = 1;
 #elif LANES > 32
 using Group = small::Block<LANES>;
@@ -119,7 +119,8 @@ extern "C" __global__ void __launch_bounds__(threads)
         const long long a = first != nullptr ? first[k] : k * nc_each;
 #if FORM == 0
         const long long m = static_cast<long long>(D) * nc;
-        given = {matrices + (first_entry != nullptr ? first_entry[k] : k * m * m), q + D * a};
+        given = {matrices + (first_entry != nullptr ? first_entry[k] : k * m * m), q + D * a,
+                 nullptr, nullptr};
 #else
         given = {matrices + D * a * COORDINATES, inverse + k * inverse_stride,
                  velocity != nullptr ? velocity + k * COORDINATES : nullptr,

@@ -352,7 +352,7 @@ template <class Group>
 FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
   // lanes: rows, and parts of the columns if there are more lanes than rows
   int rows = Group::size;
-  while (rows / 2 >= n) rows /= 2;
+  while (rows > 1 && rows / 2 >= n) rows /= 2;
   const int row = group.lane() & (rows - 1);
   const int part = group.lane() / rows;
   const int parts = Group::size / rows;
@@ -432,8 +432,8 @@ struct Shared : Count<Fixed> {
   }
 };
 
-/// W as a matrix, by columns.
-template <class Law, class Group>
+/// W as a matrix: all of it, or its blocks (D x D) that are not empty.
+template <class Law, class Group, bool Sparse = false>
 struct Dense : Shared<Law, Group> {
   using Base = Shared<Law, Group>;
   using Base::D;
@@ -444,11 +444,15 @@ struct Dense : Shared<Law, Group> {
 
   /// One problem of the caller.
   struct Given {
-    const double* W;  ///< (m x m) by columns; by rows if it is copied
-    const double* q;  ///< (m)
+    const double* W;    ///< (m x m) by columns; by rows if it is copied. Blocks: each by rows
+    const double* q;    ///< (m)
+    const int* starts;  ///< of blocks: (nc + 1) the first block of each contact, and
+    const int* columns;  ///< the contact of each block's columns; the diagonal is among them
   };
 
-  const double* W = nullptr;  // (m x m) by columns
+  const double* W = nullptr;  // (m x m) by columns, or the blocks
+  const int* starts = nullptr;
+  const int* columns = nullptr;
   double* copy = nullptr;     // of W, or null
   double* S;                  // (n x n + 1), n = padded(m)
   double* known;              // (m) the right-hand sides
@@ -485,10 +489,13 @@ struct Dense : Shared<Law, Group> {
       this->set(contacts);
       const int m = D * nc;
       W = copy != nullptr ? copy : given.W;
-      for (int k = group.lane(); k < m * m; k += Group::size) {
+      starts = given.starts;
+      columns = given.columns;
+      const int entries = Sparse ? D * D * starts[nc] : m * m;
+      for (int k = group.lane(); k < entries; k += Group::size) {
         const double entry = given.W[k];
         bad = bad || !is_finite(entry);
-        if (copy != nullptr) copy[k / m + k % m * m] = entry;
+        if (copy != nullptr) copy[Sparse ? k : k / m + k % m * m] = entry;
       }
       FCLIB_UNROLL
       for (int o = 0; o < Own; ++o) {
@@ -500,7 +507,14 @@ struct Dense : Shared<Law, Group> {
           const int at = D * a + k;
           q[o][k] = given.q[at];
           bad = bad || !is_finite(q[o][k]);
-          size[o] += absolute(given.W[at + m * at]) / D;
+          if (!Sparse) size[o] += absolute(given.W[at + m * at]) / D;
+        }
+        for (int e = Sparse ? starts[a] : 0; Sparse && e < starts[a + 1]; ++e) {
+          if (columns[e] != a) continue;
+          FCLIB_UNROLL
+          for (int k = 0; k < D; ++k) {
+            size[o] += absolute(given.W[D * D * e + (D + 1) * k]) / D;
+          }
         }
       }
     }
@@ -518,6 +532,18 @@ struct Dense : Shared<Law, Group> {
       if (a >= nc) break;
       FCLIB_UNROLL
       for (int k = 0; k < D; ++k) y[o][k] = 0;
+      if (Sparse) {
+        for (int e = starts[a]; e < starts[a + 1]; ++e) {
+          FCLIB_UNROLL
+          for (int k = 0; k < D; ++k) {
+            FCLIB_UNROLL
+            for (int l = 0; l < D; ++l) {
+              y[o][k] += W[D * D * e + D * k + l] * x[D * columns[e] + l];
+            }
+          }
+        }
+        continue;
+      }
       const double* column = W + D * a;
       for (int j = 0; j < m; ++j, column += m) {
         FCLIB_UNROLL
@@ -608,7 +634,8 @@ struct Dense : Shared<Law, Group> {
   /// S = I + D W and the right-hand side, with rows of the identity from `used` to n.
   FCLIB_LANES void fill(int used, int n) {
     const int m = D * nc;
-    for (int k = group.lane(); k < nc * nc; k += Group::size) {
+    if (Sparse) fill_blocks(used, n);
+    for (int k = group.lane(); !Sparse && k < nc * nc; k += Group::size) {
       const int a = k % nc, b = k / nc;
       const int to = D * place_of[a], from = D * place_of[b];
       if (to < 0 || from < 0) continue;
@@ -636,6 +663,35 @@ struct Dense : Shared<Law, Group> {
       if (i == j) S[i + ld * n] = 0;
     }
     group.sync();
+  }
+
+ private:
+  /// The part of `fill` for the blocks: each lane has the rows of its contacts.
+  FCLIB_LANES void fill_blocks(int used, int n) {
+    for (int a = group.lane(); a < nc; a += Group::size) {
+      const int to = D * place_of[a];
+      if (to < 0) continue;
+      FCLIB_UNROLL
+      for (int i = 0; i < D; ++i) {
+        for (int j = 0; j < used; ++j) S[to + i + ld * j] = to + i == j ? 1.0 : 0.0;
+        S[ld * n + to + i] = known[D * a + i];
+      }
+      const double* slope = slopes + D * D * a;
+      for (int e = starts[a]; e < starts[a + 1]; ++e) {
+        const int from = D * place_of[columns[e]];
+        if (from < 0) continue;
+        FCLIB_UNROLL
+        for (int i = 0; i < D; ++i) {
+          FCLIB_UNROLL
+          for (int j = 0; j < D; ++j) {
+            double sum = 0;
+            FCLIB_UNROLL
+            for (int l = 0; l < D; ++l) sum += slope[D * i + l] * W[D * D * e + D * l + j];
+            S[to + i + ld * (from + j)] += sum;
+          }
+        }
+      }
+    }
   }
 };
 
@@ -832,7 +888,7 @@ struct Bodies : Shared<Law, Group> {
   /// K = I + B^T D B. Each lane has its rows; if there are more lanes, each has some columns of a row.
   FCLIB_LANES void fill(int n) {
     int rows = Group::size;
-    while (rows / 2 >= n) rows /= 2;
+    while (rows > 1 && rows / 2 >= n) rows /= 2;
     const int part = group.lane() / rows;
     const int parts = Group::size / rows;
     for (int i = group.lane() & (rows - 1); i < nv; i += rows) {

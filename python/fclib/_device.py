@@ -142,12 +142,12 @@ def plan(
     if form == "bodies" and coordinates <= FEW_COORDINATES:
         form = "few coordinates"
     if form == "few coordinates":
-        lanes = _power(contacts, 4, 32)
+        lanes = _power(contacts, 1, 32)
     elif form == "bodies":
         lanes = 128 if coordinates > 48 else 64 if coordinates > 32 else 32
     else:
         lanes = (
-            _power(4 * contacts if contacts > 4 else contacts, 4, 32)
+            _power(4 * contacts if contacts > 4 else contacts, 1, 32)
             if contacts <= SHARED_COPY
             else 64 if contacts <= 16 else 128 if contacts <= 32 else 256
         )  # fmt: skip

@@ -163,6 +163,7 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 ),
                 "problems": len(own),
                 "distinct": catalog.distinct(own),
+                "trivial": sum(row["trivial"] is not None for row in own),
                 "solved": sum(map(catalog.is_answered, own)) if tried else "",
                 "dof": span("n"),
                 "contacts": span("nc"),

@@ -18,6 +18,7 @@ published.py  the trajectories of all published versions. Needs trajectory.py
 set_index.py  the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem, in catalog.parquet. Needs no other module
+trivial.py    whether r = 0 solves a problem. Needs no other module
 references.py solutions: finds them, judges them by both maps, stores them. Needs catalog.py
 build.py      makes the files of a family; goes on after a kill. Needs plan.py, references.py and
               ratings.py

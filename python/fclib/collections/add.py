@@ -26,6 +26,7 @@ from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
 from fclib.collections.references import Found
+from fclib.collections.trivial import trivial
 
 SUFFIXES = (".hdf5", ".h5")
 VERSION = "own"
@@ -227,6 +228,7 @@ class Part:
             "number": number,
             **facts_of(problem),
             "nnz_W": nnz(problem.W) if form == "local" else None,
+            "trivial": trivial(problem),
             **(found.row | {"tol": self.rules.tol} if found is not None else {}),
             **dict.fromkeys(catalog.FILES),
             **stored,

@@ -40,6 +40,7 @@ from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
 from fclib.collections.record import record
 from fclib.collections.references import Found
+from fclib.collections.trivial import trivial
 
 if TYPE_CHECKING:
     from fclib.analysis import Enumeration
@@ -416,7 +417,8 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         sweeps = trial.iterations
     found = reference(plan, item.problem)
     guesses = guesses_of(plan, item, before)
-    row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
+    row = describe(plan, kept.looked, item)
+    row |= {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps, "trivial": trivial(local)}
     states = states_of_contacts(plan, item.problem)
     several = solutions_of(states)
     if found is not None:

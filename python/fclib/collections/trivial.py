@@ -13,14 +13,17 @@ NO_APPROACH: Final = "no contact approaches"  # also if joints hold the bodies
 ZERO: Final = "r = 0 is a solution"  # up to the tolerance
 
 
-def trivial(local: Any) -> str | None:
+def trivial(problem: Any) -> str | None:
     """Why a problem is trivial, in words; None if it is not.
 
+    If it has joints, their multipliers follow from r = 0. If they cannot be eliminated, or M cannot
+    be inverted, nothing is said.
+
     Args:
-        local: its local form. Of one with joints the multipliers follow from r = 0. If they cannot
-            be eliminated, nothing is said.
+        problem: the problem; its local form is quicker, if it is at hand.
     """
     try:
+        local = problem.condense() if problem.kind.startswith("global") else problem
         reduced = local.eliminate() if local.p else local
         zero = np.zeros(local.spacedim * local.nc)
         if not judge(reduced, _core.Solution(r=zero)).ok:

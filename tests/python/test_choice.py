@@ -395,7 +395,6 @@ def test_commands_measure_and_choose_and_go_on(
 ) -> None:
     """The whole way on two small families; a short campaign in place of that of hours."""
     work, out, states = tmp_path / "work", tmp_path / "lists", tmp_path / "package/trajectories"
-    out.mkdir()
     families = ("--family", "existence/ManySolutions", "--family", "simulators/SiconosBoxes")
     told = command("candidates", work, *families, "--estimate")
     assert told.exit_code == 0, told.output

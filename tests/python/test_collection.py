@@ -637,6 +637,51 @@ def test_verify_fails_exactly_if_check_does(built: Path, tmp_path: Path, mass: f
     assert seen == {True, False}
 
 
+def test_a_file_without_a_solution_says_why_or_is_refused(tmp_path: Path) -> None:
+    """By `verify` as by `check`, whatever the catalogue says."""
+    table = collections.build([plan(problems=2, references=False)], tmp_path, pictures=False)
+    rows = table.to_pylist()
+    paths = [tmp_path / path for row in rows for path, _ in catalog.files_of(row)]
+    for path in paths:
+        assert fclib.read_attributes(path, "info")["solution"] == "none was looked for"
+        assert invoke("check", path).exit_code == 0
+    assert all(verdict.ok for verdict in collections.verify(tmp_path))
+    fclib.write(paths[0], read(paths[0]))  # and no longer says why
+    rows[0]["global_sha256"] = catalog.sha256(paths[0])
+    catalog.write_catalog(tmp_path / catalog.FILE, rows)
+    assert invoke("check", paths[0]).exit_code == 1
+    wrong = [verdict for verdict in collections.verify(tmp_path) if not verdict.ok]
+    assert [(one.path, one.status) for one in wrong] == [(rows[0]["global_file"], "no solution")]
+    assert "does not say why" in wrong[0].message
+
+
+def test_r_0_is_not_the_reference_of_what_has_other_solutions(tmp_path: Path) -> None:
+    """Klarbring's mass on springs with much friction, five of them side by side."""
+    block = np.linalg.inv([[2.0, -1.0], [-1.0, 1.0]])
+    many = fclib.LocalProblem(
+        spacedim=2, W=np.kron(np.eye(5), block), q=[1.0, 3.5] * 5, mu=[2.0] * 5
+    )
+    found = references.find(many, "auto", 1e-8)
+    assert not found.solution.r.any()
+    others = references.others(many, found)
+    assert others
+    for one in others:
+        assert fclib.merit(many, one).error <= 1e-8
+        assert one.r.any()
+    best = references.best_first(found, many, [found.solution, *others], "nsn-ac")
+    assert best.ok
+    assert best.solution.r.any()
+    assert best.solver == "nsn-ac"
+    # with little friction there is only one, and what is solved otherwise has no need of others
+    slippery = many.replace(mu=0.1 * many.mu)
+    assert references.others(slippery, references.find(slippery, "auto", 1e-8)) == []
+    assert references.others(many, best) == []
+    path = tmp_path / "many.hdf5"
+    references.write(path, many, best, (), [found.solution, *others])
+    assert len(fclib.read_solutions(path)) == 1 + len(others)
+    assert read_solution(path).r.any()
+
+
 def test_a_cut_build_leaves_a_catalogue_of_what_is_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

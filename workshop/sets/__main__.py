@@ -122,6 +122,7 @@ def choose_sets(
     version.
     """
     rule = select.Rule()
+    target.mkdir(parents=True, exist_ok=True)
     package = states.parent if states is not None else published.IN_PLACE
     table = package / ratings.FOLDER / f"choice-{version}.csv"
     try:
@@ -170,6 +171,7 @@ def choose_sequences(
 ) -> None:
     """Choose the simulations of the set sequences; those without stored states are simulated."""
     rule = sequences.Rule()
+    target.mkdir(parents=True, exist_ok=True)
     try:
         chosen = sequences.choose(select.read_table(folder / difficulty.TABLE), rule)
         choices = []

@@ -420,9 +420,11 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
     row = describe(plan, kept.looked, item)
     row |= {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps, "trivial": trivial(local)}
     states = states_of_contacts(plan, item.problem)
-    several = solutions_of(states)
+    several, by = solutions_of(states), "enumeration"
     if found is not None:
-        found = references.best_first(found, item.problem, several)
+        if not several and (more := references.others(item.problem, found)):
+            several, by = [_core.Solution(r=found.solution.r, l=found.solution.l), *more], "nsn-ac"
+        found = references.best_first(found, item.problem, several, by)
         row |= found.row | {"tol": plan.tol}
     words, known = known_of(plan, item.problem, local, found, states, row)
     info = stamped(item.problem.info, plan, kept.looked, words)

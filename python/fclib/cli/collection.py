@@ -443,7 +443,8 @@ def find(
     """Find the problems of a collection by the columns of its catalogue.
 
     A condition compares columns, numbers and texts, with and, or, not and brackets. A comparison
-    with a missing value is not true. "same_as is None" leaves out the copies, and "trivial is None" what r = 0 solves.
+    with a missing value is not true. "same_as is None" leaves out the copies, and "trivial is None"
+    what r = 0 solves.
     """
     folder = folder or library.default_folder()
     report = Report(as_json)

@@ -8,15 +8,18 @@ import http.server
 import importlib
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -29,11 +32,20 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog, published, ratings, references, set_index
+from fclib.collections import (
+    archives,
+    catalog,
+    published,
+    ratings,
+    references,
+    set_index,
+    trajectory,
+)
 from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
 from fclib.collections.set_index import DATA
 from fclib.simulate import control_of
+from workshop.sets import metadata
 
 FAMILIES = collections.families()
 
@@ -350,18 +362,80 @@ def test_files_say_what_is_cheaply_known(built: Path, tmp_path: Path) -> None:
         assert whole.matrix_info["M"].rank == whole.n
         for problem in (whole, local):
             assert "Existence: exists by Slater" in problem.info.math_info
-            assert "Left out: conditioning of H" in problem.info.math_info
+            assert "Left out: conic programs" in problem.info.math_info
             # of u and of r apart: four contacts under a box move nothing in more than one way
             assert "Velocity: u" in problem.info.math_info
             assert "Reactions: not unique: at the solution at hand" in problem.info.math_info
         assert row["existence"] == "exists by Slater"
-        assert row["conditioning_H"] is None
+        singular = np.linalg.svd(whole.H.toarray(), compute_uv=False)
+        kept = singular[singular > 1e-12 * singular[0]]
+        assert (whole.matrix_info["H"].rank, row["rank_H"]) == (len(kept), len(kept))
+        assert row["conditioning_H"] == pytest.approx(kept[0] / kept[-1], rel=1e-2)
         # the digest is of the data
         assert fclib.digest(whole) == row["digest"]
     alone = collections.build([plan(problems=2, references=False)], tmp_path, pictures=False)
     for row in alone.to_pylist():
         assert not read(tmp_path / row["local_file"]).matrix_info
     assert not set(catalog.ANALYSIS) & set(alone.column_names)
+
+
+def test_every_file_has_all_metadata(built: Path) -> None:
+    """Read with h5py alone."""
+    paths = [*built.rglob("*.hdf5"), *(DATA / "tiny").rglob("*.hdf5")]
+    assert len(paths) > 30
+    for path in paths:
+        with h5py.File(path) as file:
+            assert list(metadata.missing(file)) == [], path
+
+
+def test_metadata_that_is_missing_is_named(built: Path, tmp_path: Path) -> None:
+    path = tmp_path / "one.hdf5"
+    shutil.copyfile(built / "small/BoxesStack/0005-global.hdf5", path)
+    gone = ("fclib_global/H/conditioning", "fclib_global/info/title", "guesses", "bodies/velocity")
+    with h5py.File(path, "r+") as file:
+        for name in gone:
+            del file[name]
+        del file["solution"]
+        assert list(metadata.missing(file)) == [
+            "info/title",
+            "H/conditioning",
+            "solution, or why there is none",
+            "guess, or why there is none",
+            "bodies/velocity",
+        ]
+
+
+def test_guesses_do_not_depend_on_what_is_built(built: Path, tmp_path: Path) -> None:
+    """Zero at the first contact; else what the same contacts had in the step before."""
+    some = collections.build([plan(count=4)], tmp_path / "some", pictures=False).to_pylist()
+    numbers = [row["number"] for row in some]
+    assert numbers == [0, 4, 7, 11]
+    for row in some:
+        (own,) = fclib.read_guesses(tmp_path / "some" / row["global_file"])
+        (same,) = fclib.read_guesses(built / row["global_file"])
+        np.testing.assert_array_equal(own.r, same.r)
+        assert own.r.any() == (row["number"] > 0)
+    # states without those of the step before have it stored with them
+    thinned = replace(plan(), chosen=tuple(numbers))
+    rows = collections.build([thinned], tmp_path / "thinned", pictures=False).to_pylist()
+    states = collections.read_trajectory(tmp_path / "thinned/small/BoxesStack/states.trajectory")
+    assert len(states) == len(states.guess) == 4
+    for row in rows:
+        path = tmp_path / "thinned" / row["global_file"]
+        (own,) = fclib.read_guesses(path)
+        (same,) = fclib.read_guesses(built / row["global_file"])
+        assert "guess" not in fclib.read_attributes(path, "info")
+        # the simulation was solved to other digits, and reactions of a box are not unique
+        normal = [guess.r[::3].sum() for guess in (own, same)]
+        assert normal[0] == pytest.approx(normal[1], rel=1e-3)
+    # and where nobody knows it, the file says so
+    bare = tmp_path / "bare" / "small/BoxesStack-1.trajectory"
+    trajectory.write(bare, replace(states, guess=()))
+    unknown = replace(thinned, trajectory=bare)
+    rows = collections.build([unknown], tmp_path / "unknown", pictures=False).to_pylist()
+    last = tmp_path / "unknown" / rows[-1]["global_file"]
+    assert fclib.read_guesses(last) == []
+    assert "do not have the step before" in fclib.read_attributes(last, "info")["guess"]
 
 
 def test_a_file_says_that_its_problem_has_no_solution(tmp_path: Path) -> None:

@@ -231,7 +231,10 @@ def bidiagonal(apply: Any, transposed: Any, size: int, steps: int = LANCZOS) -> 
 
     Golub and Kahan's bidiagonalisation, with full reorthogonalisation, from a fixed start.
     """
-    v = np.random.default_rng(0).standard_normal(size)
+    # of the range of A^T: nothing of the null space, whose values would look small
+    v = np.asarray(transposed(apply(np.random.default_rng(0).standard_normal(size))), dtype=float)
+    if not v.any():
+        return np.zeros(0)
     right: list[Array] = [v / np.linalg.norm(v)]
     left: list[Array] = []
     diagonal: list[float] = []

@@ -1,4 +1,4 @@
-"""The rule of the sets standard, hard, open and sequences, on tables and stores that are planted."""
+"""The rule of the sets standard, hard, open and sequences, on planted tables and stores."""
 
 import json
 import math
@@ -16,7 +16,7 @@ import fclib
 from fclib.bench import Campaign, Job, Limits, ProblemFacts, Record, SolverChoice, Store
 from fclib.collections import published, ratings, set_index, trajectory
 from fclib.collections.trivial import NO_APPROACH, ZERO, trivial
-from workshop.sets import candidates, difficulty, features, select, sequences
+from workshop.sets import candidates, choose, difficulty, features, select, sequences
 from workshop.sets.__main__ import app
 
 load: Any = fclib.load
@@ -167,7 +167,8 @@ def test_standard_is_within_all_bounds(chosen: tuple[list[dict[str, Any]], selec
     assert all(map(math.isfinite, (min(costs) for costs in few)))  # nothing that nobody solves
     # every solver but the best and the worst
     solved = sorted(np.isfinite(np.array(values)).mean(axis=0))
-    assert 0.1 <= solved[1] and solved[-2] <= 0.9
+    assert solved[1] >= 0.1
+    assert solved[-2] <= 0.9
 
 
 def test_standard_has_no_family_that_all_solve() -> None:
@@ -441,12 +442,40 @@ def test_commands_measure_and_choose_and_go_on(
     reasons = select.read_table(states.parent / ratings.FOLDER / "choice-3.csv")
     assert len(reasons) == 12
     assert all(row["why"] for row in reasons)
+    # a list that another version replaces stays
+    later = command("choose", work, "--out", out, "--states", states, "--version", 4)
+    assert later.exit_code == 0, later.output
+    kept = json.loads((out / "older/open-3.json").read_text())
+    assert kept == lists["open"]
+    assert json.loads((out / "open.json").read_text())["rule"]["version"] == "4"
     # a choice that is there is not rewritten by another one
     assert command("choose", work, "--out", out, "--states", states, "--version", 3).exit_code == 0
     add(work / "difficulty-long.sqlite", stay[0], "auto", 1.0, limit=60.0)
     other = command("choose", work, "--out", out, "--states", states, "--version", 3)
     assert other.exit_code == 1
     assert "is another choice" in " ".join(other.output.split())
+
+
+def test_versions_of_a_list_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of its own, one that grew, and one by another rule."""
+    one, two, three = (
+        set_index.Choice("Wall", {}, 0, k, k, f"{k}", since=since)
+        for k, since in ((1, "7"), (2, "8"), (3, ""))
+    )
+    monkeypatch.setattr(set_index, "DATA", tmp_path)
+    monkeypatch.setitem(set_index.SETS, "hard", ("9", "what most solvers fail on"))
+    (tmp_path / set_index.OLDER).mkdir()
+    choose.write_list(tmp_path / set_index.OLDER / "hard-8.json", [one, two], {})
+    choose.write_list(tmp_path / "hard.json", [three], {})
+    set_index.choices.cache_clear()
+    try:
+        numbers = {
+            version: [choice.number for choice in set_index.listed("hard", version)]
+            for version in ("6", "7", "8", "9", "own")
+        }
+    finally:
+        set_index.choices.cache_clear()
+    assert numbers == {"6": [], "7": [1], "8": [1, 2], "9": [3], "own": []}
 
 
 # ---- sequences

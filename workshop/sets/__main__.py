@@ -142,6 +142,7 @@ def choose_sets(
             own: candidates.candidates_of(own, folder)
             for own in dict.fromkeys(map(select.folder_of, taken))
         }
+        choose.archive(target, select.SETS, version)
         for name in select.SETS:
             choices = select.choices_of(sources, [rows[k] for k in chosen.of(name)])
             choose.write_list(
@@ -187,6 +188,7 @@ def choose_sequences(
                     version,
                     states or published.IN_PLACE / published.FOLDER,
                 )
+        choose.archive(target, ["sequences"], version)
         choose.write_list(target / "sequences.json", choices, rule.record() | {"version": version})
     except FAULTS as error:
         fail(str(error))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog, trajectory
+from fclib.collections import catalog, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
 from fclib.collections.set_index import Choice
@@ -47,6 +47,20 @@ def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
     catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
+
+
+def archive(folder: Path, names: Iterable[str], version: str) -> None:
+    """Keep the present lists as those of their version, if they are of another one."""
+    for name in names:
+        path = folder / f"{name}.json"
+        if not path.is_file():
+            continue
+        own = json.loads(path.read_text(encoding="utf-8"))["rule"].get("version")
+        own = own or set_index.version(name)
+        if own != version:
+            target = folder / set_index.OLDER / f"{name}-{own}.json"
+            target.parent.mkdir(exist_ok=True)
+            path.replace(target)
 
 
 # ---- tiny

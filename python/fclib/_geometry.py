@@ -117,7 +117,7 @@ class Contacts(_Table):
     tangent: Numbers = field(
         metadata=column("nc", 3, float, "T1; T2 = N x T1, in the plane T1 is T")
     )
-    gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 where they overlap"))
+    gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 if they overlap"))
 
     def __post_init__(self) -> None:
         """Raises ValueError if the columns contradict each other."""
@@ -155,7 +155,7 @@ class Bodies(_Table):
     """
 
     name: str = field(metadata=column("nb", 1, str, "the names of the bodies, a line for each"))
-    moves: Integers = field(metadata=column("nb", 1, int, "1 where something moves it, 0: fixed"))
+    moves: Integers = field(metadata=column("nb", 1, int, "1 if something moves it, 0: fixed"))
     place: Numbers = field(metadata=column("nb", 3, float, "of the body's frame, in the world"))
     turn: Numbers = field(metadata=column("nb", 4, float, "of the body's frame"))
     shape_body: Integers = field(metadata=column("ns", 1, int, "the body of each shape"))
@@ -211,7 +211,7 @@ class Bodies(_Table):
     planar: Integers = field(
         default_factory=nothing(int),
         metadata=column(
-            "1", 1, int, "1 where all moves in the plane x, z; absent elsewhere", optional=True
+            "1", 1, int, "1 if all moves in the plane x, z; else absent", optional=True
         ),
     )
     mass: Numbers = field(
@@ -243,10 +243,10 @@ class Bodies(_Table):
         ),
     )
     unit: str = field(
-        default="", metadata=column("1", 1, str, "of lengths; absent where it is m", optional=True)
+        default="", metadata=column("1", 1, str, "of lengths; absent if it is m", optional=True)
     )
     mass_unit: str = field(
-        default="", metadata=column("1", 1, str, "of masses; absent where it is kg", optional=True)
+        default="", metadata=column("1", 1, str, "of masses; absent if it is kg", optional=True)
     )
 
     def __post_init__(self) -> None:

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 pytest.importorskip("pyarrow")
 
 import fclib
+from fclib._judge import NO_APPROACH, ZERO, trivial
 from fclib.bench import Campaign, Job, Limits, ProblemFacts, Record, SolverChoice, Store
 from fclib.collections import published, ratings, set_index, trajectory
-from fclib.collections.trivial import NO_APPROACH, ZERO, trivial
 from workshop.sets import candidates, choose, difficulty, features, select, sequences
 from workshop.sets.__main__ import app
 

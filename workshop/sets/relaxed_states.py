@@ -50,7 +50,7 @@ def depth(states: trajectory.Trajectory, contacts: Any) -> float:
 
 
 def mended(states: trajectory.Trajectory, version: str) -> trajectory.Trajectory | None:
-    """A version of states within the bound; None where they are."""
+    """A version of states within the bound; None if they are."""
     model, scheme = states.model, states.scheme
     position = states.position.copy()
     for k in range(len(states)):

@@ -32,11 +32,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _digest, _solve
-from fclib._judge import TOLERANCE
+from fclib._judge import TOLERANCE, trivial
 from fclib.collections import catalog, trajectory
 from fclib.collections.build import facts_of
 from fclib.collections.set_index import Choice
-from fclib.collections.trivial import trivial
 from workshop.sets import features
 from workshop.sets.candidates import Candidates
 

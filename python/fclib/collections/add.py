@@ -21,12 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _sequence
-from fclib._judge import MARK, TOLERANCE, judge
+from fclib._judge import MARK, TOLERANCE, judge, trivial
 from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
 from fclib.collections.references import Found
-from fclib.collections.trivial import trivial
 
 SUFFIXES = (".hdf5", ".h5")
 VERSION = "own"

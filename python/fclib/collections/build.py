@@ -32,15 +32,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib._judge import TOLERANCE
+from fclib._judge import TOLERANCE, trivial
 from fclib._origin import origin_of
 from fclib.collections import catalog, ratings, references, trajectory
 from fclib.collections.catalog import STATE
-from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
 from fclib.collections.record import record
-from fclib.collections.references import Found
-from fclib.collections.trivial import trivial
+from fclib.collections.references import Found, guess_of
 
 if TYPE_CHECKING:
     from fclib.analysis import Enumeration

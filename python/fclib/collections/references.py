@@ -10,6 +10,8 @@
 A solver works to the tolerance asked for. FINISH then goes on from its result, to TARGET. Near a
 solution Newton's methods take a few iterations, and all others take many. If FINISH comes no
 nearer, for example with elastic bodies, `auto` goes on.
+
+`guess_of` makes a guess for the problem of the next step: the impulses of the same contacts.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core, _solve
+from fclib import _core, _geometry, _solve
 from fclib._judge import MARK, TOLERANCE, Judgement, judge
+from fclib._solve import Given
 from fclib.collections.catalog import PROVEN
 
 # the best that doubles allow for most problems: a product W r is rounded by 1e-14 of its terms
@@ -288,3 +291,26 @@ def why_none(found: Found, guess: int) -> str:
         f"none is known: guess {guess} is the best iterate, error {found.error:.1e} by both maps,"
         f" {found.solver}; a solution's is at most {TOLERANCE:g}"
     )
+
+
+def guess_of(before: Any, solution: Given, problem: Any) -> _core.Solution | None:
+    """A guess for one problem from the solution of another, contact by contact.
+
+    A new contact gets no reaction. The multipliers stay if their number is the same. The result is
+    None if one of the two problems does not name its contacts.
+
+    Raises:
+        ValueError: the size of the solution does not fit its problem.
+    """
+    if before.contacts is None or problem.contacts is None or before.spacedim != problem.spacedim:
+        return None
+    solution = _core.solution_from(solution)
+    planar = problem.bodies is not None and problem.bodies.is_planar
+    r = _geometry.carried(
+        before.contacts, problem.contacts, solution.r, problem.spacedim, planar=planar
+    )
+    multipliers = None
+    if problem.p:
+        same = solution.l is not None and len(solution.l) == problem.p
+        multipliers = solution.l if same else np.zeros(problem.p)
+    return _core.Solution(r=r, l=multipliers)

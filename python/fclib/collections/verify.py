@@ -41,10 +41,11 @@ def verify(folder: str | Path, progress: Callable[[str], None] | None = None) ->
     """Hash each file of a folder again, read it, and judge its solutions from the data alone.
 
     A stored solution must be one, by the same judgement as `fclib check`; if there are several,
-    each must be one. A file without one must say why. So no file is ok that `check` refuses. The data of the form that the catalogue describes must have the digest in the
-    catalogue. A problem that has the name and version of a published one must be that one, up to
-    rounding on another machine (ROUNDING). Entries that the catalogue lacks come last: families
-    whose build was cut, and files without a row.
+    each must be one. A file without one must say why. So no file is ok that `check` refuses. The
+    data of the form that the catalogue describes must have the digest in the catalogue. A problem
+    that has the name and version of a published one must be that one, up to rounding on another
+    machine (ROUNDING). Entries that the catalogue lacks come last: families whose build was cut,
+    and files without a row.
 
     Raises:
         CatalogError: the folder has no catalogue.

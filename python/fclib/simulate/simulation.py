@@ -341,7 +341,7 @@ def contradiction(model: Model, system: System) -> str:
     involved = kept[shares > RANK * shares.max(initial=0.0)]
     words = sorted({names[k] for k in (others[worst], *involved)})
     return (
-        f"the equalities {', '.join(words)} contradict each other: where the others hold one is off"
+        f"the equalities {', '.join(words)} contradict each other: if the others hold, one is off"
         f" by {gaps[worst]:.2g} m or rad, and equalities are rigid here, not soft as in MuJoCo;"
         ' leave one of them out (active="false" in the MJCF)'
     )

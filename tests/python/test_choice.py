@@ -478,6 +478,32 @@ def test_versions_of_a_list_are_told_apart(tmp_path: Path, monkeypatch: pytest.M
     assert numbers == {"6": [], "7": [1], "8": [1, 2], "9": [3], "own": []}
 
 
+def test_published_states_have_guesses_without_the_steps_before(tmp_path: Path) -> None:
+    own = "rt444/KaplasTower"
+    if published.root() is None:
+        pytest.skip("the package of trajectories is not here")
+    found = candidates.candidates_of(own, tmp_path, kept=3)
+    assert found.states is not None
+    first, middle, _ = found.numbers
+    digests = {n: found.states.digest[found.states.index(n)] for n in (first, middle, middle + 1)}
+    chosen = [set_index.Choice("KaplasTower", {}, 0, n, n, text) for n, text in digests.items()]
+    (path,) = select.publish({own: found}, chosen, "standard", "9", tmp_path)
+    states = trajectory.read(path)
+    # zero at the first contact, and the third one's step before is there
+    guesses = states.guess
+    assert guesses[0] is not None
+    assert not guesses[0].any()
+    assert guesses[2] is None
+    # at rest, the step before has nearly the same reactions: they carry the weight
+    problem = states.problem(1).problem
+    assert guesses[1] is not None
+    guess = fclib.Solution(r=guesses[1])
+    assert (
+        fclib.merit(problem, guess).error
+        < 0.1 * fclib.merit(problem, fclib.Solution(r=0 * guess.r)).error
+    )
+
+
 # ---- sequences
 
 

@@ -24,7 +24,7 @@ import io
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,7 +34,7 @@ import numpy.typing as npt
 from fclib import _digest, _solve
 from fclib._judge import TOLERANCE, trivial
 from fclib.collections import catalog, trajectory
-from fclib.collections.build import facts_of
+from fclib.collections.build import facts_of, guess_for, item_of
 from fclib.collections.set_index import Choice
 from workshop.sets import features
 from workshop.sets.candidates import Candidates
@@ -579,6 +579,20 @@ def publish(
             raise FileExistsError(
                 f"{target}: has other problems; choose a further version (--version)"
             )
-        trajectory.write(target, trajectory.part(found.states, own, name, version))
+        part = trajectory.part(found.states, own, name, version)
+        trajectory.write(target, replace(part, guess=guesses_of(found, sorted(own))))
         written.append(target)
     return written
+
+
+def guesses_of(found: Candidates, numbers: Sequence[int]) -> tuple[Any, ...]:
+    """The guess of each problem whose step before is not among them; a build makes the others."""
+    assert found.states is not None
+    guesses: list[Any] = []
+    for number in numbers:
+        guess = None
+        if number - 1 not in numbers:
+            item = item_of(found.plan, found.states, number)
+            guess = guess_for(found.plan, found.states, item, None)
+        guesses.append(None if guess is None else guess.r)
+    return tuple(guesses)

@@ -9,7 +9,7 @@ standard, hard, tiny, rr9118, fclib2024     chosen problems, in folders of their
 
 A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
 stored, its problems never change (`published.py`). A list that has grown notes the version in which
-each problem came.
+each problem came. A list that was replaced stays in data/older.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, evenly, families, source
 
 DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
+OLDER = "older"  # folder of lists that newer ones have replaced, NAME-VERSION.json
 SHIPPED = ("tiny",)  # sets whose problems need no build
 
 # name, version, description; a set that a family names and that is missing here has version 1
@@ -98,7 +99,19 @@ def listed(name: str, version_: str) -> list[Choice]:
         return list(choices(name))
     if not (version_ or "").isdecimal():
         return []
-    return [c for c in choices(name) if c.since and int(c.since) <= int(version_)]
+    # of a list that has grown, the next one tells
+    there = {int(path.stem.rpartition("-")[2]): path for path in older_lists(name)}
+    later = min((one for one in there if one >= int(version_)), default=None)
+    found = choices(name) if later is None else Choice.read(there[later])
+    if later == int(version_):
+        return list(found)
+    return [c for c in found if c.since and int(c.since) <= int(version_)]
+
+
+def older_lists(name: str) -> list[Path]:
+    """The files of the lists that a set had in earlier versions, by another rule."""
+    found = (DATA / OLDER).glob(f"{name}-*.json")
+    return sorted(path for path in found if path.stem.rpartition("-")[2].isdecimal())
 
 
 def kind_of(folder: str) -> str:

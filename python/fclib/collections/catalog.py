@@ -70,6 +70,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
         "bool",
         "whether that is a solution, and stored as one; null: none was looked for",
     ),
+    ("trivial", "string", "why r = 0 solves it; null: it does not, or nobody tried"),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null if the hard ones were not selected"),
     ("rating", "string", "easy, hard or open, by stored runs; null: the problem was not run"),
     ("left_out", "string", "what the scene asked for and no problem holds; null: nothing"),

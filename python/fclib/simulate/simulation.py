@@ -347,6 +347,13 @@ def contradiction(model: Model, system: System) -> str:
     )
 
 
+def carried_to(model: Model, start: State, contacts: Contacts) -> Vector:
+    """The guess (d nc) that a step has from the one before, for contacts of the model as it is."""
+    if not len(start.r):
+        return np.zeros(contacts.dimension * len(contacts))
+    return carry_over(start, contacts, places_of(model, contacts))
+
+
 def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:
     """A guess of r (d nc): the last impulses of the same shapes at the same place.
 

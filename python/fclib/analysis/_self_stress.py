@@ -35,7 +35,7 @@ import scipy.sparse as sp
 from scipy.linalg import qr
 from scipy.sparse.linalg import lsmr, spsolve
 
-from fclib import _core
+from fclib import _laws
 from fclib.analysis._bounds import (
     Exact,
     below,
@@ -114,7 +114,7 @@ def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress
     if not np.isfinite(x).all():
         return None, "its numbers are too large or too small for doubles"
     off, delta, size = 0.0, 0.0, 0.0
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         M = data.matrices["M"]
         if (M != M.T).nnz or not lower_bound(M) > 0:
             return None, "M is not shown to be symmetric positive definite"
@@ -150,7 +150,7 @@ def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress
 def _free(data: Data, joints: Joints) -> Array:
     """The velocity of a global problem without contact reactions."""
     problem = data.problem
-    assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+    assert isinstance(problem, _laws.Global)
     M = data.matrices["M"]
     if not joints.kept.size:
         return np.asarray(spsolve(M, problem.f))
@@ -260,7 +260,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
 
 def _moved(data: Data) -> sp.csr_array:
     """B of B (r, l) = 0: the motion by reactions, and by those of joints."""
-    if isinstance(data.problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(data.problem, _laws.Global):
         parts = [data.matrices["H"]] + ([data.matrices["G"]] if "G" in data.matrices else [])
         return sp.csr_array(sp.hstack(parts))
     if "V" not in data.matrices:

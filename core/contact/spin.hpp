@@ -70,9 +70,11 @@ class Product {
       weight += mu_[g] * mu_[g];
       n = sum / weight;
     }
+    if (n < 0) n = 0;  // by rounding, on the border of the polar cone
     Vec result = x;
     result[0] = n;
-    scale(result, [&](int g) { return binds[g] ? mu_[g] * n / norms[g] : Real(1); });
+    scale(result,
+          [&](int g) { return binds[g] && norms[g] > 0 ? mu_[g] * n / norms[g] : Real(1); });
     return result;
   }
 

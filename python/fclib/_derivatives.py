@@ -310,7 +310,7 @@ class _Point:
             beyond = _beyond(group, z)
             self.degenerate |= ~opened & (np.abs(beyond) <= border)
             slides = (beyond > 0) | ~group.axes.all(axis=1)
-            for a in np.flatnonzero(~opened):
+            for a in np.flatnonzero(~opened).tolist():
                 tangent = slice(d * a + group.part.start, d * a + group.part.stop)
                 if not slides[a]:
                     self.by_u[tangent, tangent] = rho[a] * np.eye(size)

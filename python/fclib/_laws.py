@@ -19,6 +19,9 @@ Problem: TypeAlias = Local | Global
 COEFFICIENTS = ("mu", "mu_s", "mu_r")
 
 
+# the root of 1/2, rounded down: a product of two limits of this share is in the ellipsoid
+INSCRIBED = 0.707106781186547
+
 CLASSES: dict[str, type[Problem]] = {
     "local": _core.LocalProblem,
     "local_rolling": _core.LocalRollingProblem,
@@ -59,6 +62,23 @@ class Group:
         if self.uniform:
             return np.asarray(self.coefficient * np.linalg.norm(moved, axis=1))
         return np.asarray(np.linalg.norm(self.axes * moved, axis=1))
+
+
+def boxes(problem: Problem, *, inner: bool) -> list[tuple[Array, slice]]:
+    """Coefficients and components of a product of disks and segments.
+
+    It is K itself if each group has a limit of its own. Beside an ellipsoid it is a product that
+    contains K, or that K contains.
+    """
+    found: list[tuple[Array, slice]] = []
+    for group in groups(problem):
+        if group.uniform:
+            found.append((group.coefficient, group.part))
+            continue
+        share = INSCRIBED if inner else 1.0
+        found.append((share * group.axes[:, 0], slice(1, 3)))
+        found.append((share * group.axes[:, 2], slice(3, 4)))
+    return found
 
 
 def law_of(kind: str) -> str:

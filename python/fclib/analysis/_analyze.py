@@ -419,7 +419,7 @@ def uniqueness(
     if constant < 1:
         reason = f"the fixed point on mu ||u_T|| is a contraction, of {constant:.2g}"
         return Uniqueness("unique", reason, constant, full)
-    frictionless = not any(mu.any() for mu, _ in data.friction)
+    frictionless = not any(group.axes.any() for group in data.friction)
     if frictionless and symmetric and sign.word in DEFINITE[:2]:
         return Uniqueness("unique", "the problem without friction is convex", constant, full)
     if np.isnan(constant):

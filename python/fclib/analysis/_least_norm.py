@@ -155,7 +155,12 @@ def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Ar
     program = Program(size)
     program.equal(A, A @ start)
     at = faces.sticking
-    limits = [(mu[faces.contacts[at]], list(range(d))[part]) for mu, part in data.friction]
+    if not all(group.uniform for group in data.friction):
+        return None
+    limits = [
+        (group.coefficient[faces.contacts[at]], list(range(d))[group.part])
+        for group in data.friction
+    ]
     for mu, components in limits:
         stacked = sp.vstack(
             [sp.diags_array(mu) @ B[d * at], *(B[d * at + k] for k in components)], format="csr"

@@ -174,7 +174,7 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
         steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), its squares may overflow doubles
         if off:
             left -= Fraction(off) * length(rows[d * a])
-        for mu, part in data.friction:
+        for mu, part in _laws.boxes(data.local, inner=False):
             friction = root_above(sum((t * t for t in u[part]), Fraction()))
             if off:
                 friction += Fraction(off) * sum(
@@ -207,7 +207,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     unknown = sp.eye_array(size, format="csr")
     normal = unknown[d * np.arange(nc)] - t
     program.nonnegative(normal, np.zeros(nc))
-    for mu, part in data.friction:
+    for mu, part in _laws.boxes(data.local, inner=True):
         components = list(range(d))[part]
         length = 1 + len(components)
         stacked = sp.vstack(
@@ -227,7 +227,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
         return None, "no reactions that move nothing were found"
     # frictionless contacts have only their normal reaction
     columns = [d * a for a in kept.tolist()]
-    for mu, part in data.friction:
+    for mu, part in _laws.boxes(data.local, inner=True):
         columns += [d * a + k for a in kept.tolist() if mu[a] > 0 for k in range(d)[part]]
     columns = [*sorted(columns), *range(own, own + extra)]
     x = _in_kernel(B[:, columns], y[columns])
@@ -238,7 +238,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     margins = []
     for a in kept.tolist():
         r = [place.get(d * a + k, Fraction()) for k in range(d)]
-        for mu, part in data.friction:
+        for mu, part in _laws.boxes(data.local, inner=True):
             friction = root_above(sum((one * one for one in r[part]), Fraction()))
             margins.append(Fraction(float(mu[a])) * r[0] - friction)
             if mu[a] > 0:

@@ -263,7 +263,7 @@ def command(
         str | None,
         typer.Option(
             help="local, global, local_rolling, global_rolling, local_spin or global_spin: which "
-            "problem of a file that holds several, or what a text holds where its sizes should "
+            "problem of a file that holds several, or what a text holds if its sizes should "
             "not decide."
         ),
     ] = None,

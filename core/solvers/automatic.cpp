@@ -112,6 +112,7 @@ const Solver& solver() {
       .citation = "this project",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .solve = solve,

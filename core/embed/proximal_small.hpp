@@ -1229,7 +1229,7 @@ class Solver {
   /// One step of Newton's method. Before it, the proximal step that the last one may have finished is
   /// judged, or the guess.
   FCLIB_LANES void advance(bool mine) {
-    const bool candidate = mine && state_ != State::inside;
+    const bool candidate = mine && !finished() && state_ != State::inside;
     if (system.group.anyone(candidate)) judge_candidate(candidate);
     const bool solving = mine && !finished();
     if (system.group.anyone(solving)) newton_step(solving);

@@ -1060,7 +1060,7 @@ struct FewCoordinates : Shared<Law, Group, Fixed> {
           for (int l = 0; l < D; ++l) t[row][l] += b * slope[D * k + l];
         }
       }
-      if (!group.anyone(slope[0] != 0)) continue;
+      if (slope[0] == 0) continue;  // no word to the other groups here: they may have fewer contacts
       FCLIB_UNROLL
       for (int j = 0; j < N; ++j) {
         FCLIB_UNROLL

@@ -126,7 +126,10 @@ def problems(nc: int, count: int, at_rest: bool, seed: int = 7) -> dict[str, Flo
     rng = np.random.default_rng([seed, nc])
     systems = [SYSTEMS[nc][1](rng) for _ in range(BASES)]
     J = np.array([one.jacobian() for one in systems])
-    inverse, friction = np.array([one.inverse for one in systems]), rng.uniform(0.2, 0.8, (BASES, nc))
+    inverse, friction = (
+        np.array([one.inverse for one in systems]),
+        rng.uniform(0.2, 0.8, (BASES, nc)),
+    )
     velocity = (0.002 if at_rest else 0.3) * rng.normal(size=(count, J.shape[2]))
     velocity[:, 2::6] -= 9.81 * STEP if at_rest else 0.2
     pick = np.arange(count) % BASES
@@ -221,9 +224,13 @@ def measure(nc: int, host: dict[str, Floats], at_rest: bool, form: str) -> dict[
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--contacts", nargs="+", type=int, choices=PROBLEMS, default=list(PROBLEMS))
-    parser.add_argument("--problems", type=int, help="of each kind, instead of the built-in numbers")
+    parser.add_argument(
+        "--problems", type=int, help="of each kind, instead of the built-in numbers"
+    )
     _results.add_option(parser)
     chosen = parser.parse_args()
     missing = _device.missing()

@@ -1,5 +1,5 @@
-// A group of lanes whose lanes are threads of the host: what lanes of a GPU would do wrong with shared
-// memory, ThreadSanitizer sees here.
+// A group of lanes whose lanes are threads of the host: what lanes of a GPU would do wrong with
+// shared memory, ThreadSanitizer sees here.
 #pragma once
 
 #include <algorithm>
@@ -58,8 +58,8 @@ struct Team {
   }
 };
 
-/// M groups of N lanes that run in step, as those of a warp: each call that a warp makes as a whole must
-/// be made by all. A call that only some make is an error after a while, not a wait for ever.
+/// M groups of N lanes that run in step, as those of a warp: each call that a warp makes as a whole
+/// must be made by all. A call that only some make is an error after a while, not a wait for ever.
 template <int N, int M>
 struct InStep {
   static constexpr int size = N;

@@ -66,7 +66,8 @@ struct Planted {
     inverse = random.vector(coordinates).array().exp();
     W = J * inverse.asDiagonal() * J.transpose();
     if (skew > 0) {
-      const Eigen::MatrixXd x = Eigen::MatrixXd::NullaryExpr(m, m, [&] { return random.vector(1)[0]; });
+      const Eigen::MatrixXd x =
+          Eigen::MatrixXd::NullaryExpr(m, m, [&] { return random.vector(1)[0]; });
       W += Eigen::MatrixXd::Identity(m, m) + skew * (x - x.transpose());
     }
     Vector u = Vector::Zero(m), r = Vector::Zero(m);
@@ -146,7 +147,8 @@ struct AsBlocks {
   static int room() { return System::room(most_contacts, false); }
   static void place(System& system, double* at) { system.place(at, most_contacts, false); }
   explicit AsBlocks(const Planted<Law>& problem) {
-    given = {problem.blocks.data(), problem.q.data(), problem.starts.data(), problem.columns.data()};
+    given = {problem.blocks.data(), problem.q.data(), problem.starts.data(),
+             problem.columns.data()};
   }
   typename System::Given given;
 };
@@ -216,7 +218,8 @@ void expect_true_words(double least_share, double skew = 0) {
   EXPECT_GE(solved, least_share * planted_count());
 }
 
-/// A share of the problems that stalls is left to `auto`: those with mu = 4, or without rolling mass.
+/// A share of the problems that stalls is left to `auto`: those with mu = 4, or without rolling
+/// mass.
 TEST(ProximalSmall, SaysOnlyWhatTheMeritSays) {
   expect_true_words<AsMatrix, Law<2>>(0.95);
   expect_true_words<AsMatrix, Law<3>>(0.95);

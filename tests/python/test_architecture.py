@@ -66,6 +66,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 PYTHON: dict[str, set[str]] = {
     "_entry_points": set(),
     "_geometry": set(),
+    "_stored": set(),
     "_suggest": set(),
     "_symmetry": set(),
     "_verdicts": set(),
@@ -88,7 +89,7 @@ PYTHON: dict[str, set[str]] = {
     "jax": {"_layer"},
     "external": {"_core", "_registry"},
     "analysis": {"_core", "_digest", "_judge", "_registry", "_solve", "_symmetry"},
-    "scenes": {"_core", "_entry_points", "_geometry", "_suggest"},
+    "scenes": {"_core", "_entry_points", "_geometry", "_stored", "_suggest"},
     "simulate": {"_core", "_geometry", "_origin", "_solve", "scenes"},
     "recorders": {"_core", "_origin", "_solve", "external", "scenes"},
     "collections": {
@@ -96,6 +97,7 @@ PYTHON: dict[str, set[str]] = {
         "_digest",
         "_geometry",
         "_judge",
+        "_stored",
         "_suggest",
         "_origin",
         "_sequence",

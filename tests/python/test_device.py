@@ -140,7 +140,7 @@ def test_what_is_left_goes_to_the_cpu_or_stays() -> None:
 def test_a_guess_saves_steps_and_other_libraries_come_in_by_dlpack() -> None:
     given = on_gpu(bodies(4, 20, 6))
     cold = fclib.solve_batch(**given)
-    foreign = {name: fake_cupy.Foreign(array) for name, array in given.items()}
+    foreign: dict[str, Any] = {name: fake_cupy.Foreign(array) for name, array in given.items()}
     warm = fclib.solve_batch(**foreign, guess=fake_cupy.Foreign(cold.r))
     assert warm.converged.all()
     assert warm.iterations.sum() == 0
@@ -190,7 +190,7 @@ def test_wrong_input_is_refused_by_its_name() -> None:
         with pytest.raises(fclib.ProblemError, match=words):
             fclib.solve_batch(**arguments)
     with pytest.raises(fclib.OptionError, match="unsolved"):
-        fclib.solve_batch(**given, unsolved="maybe")
+        fclib.solve_batch(**given, unsolved="maybe")  # type: ignore[arg-type]
 
 
 def test_without_cupy_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,12 @@
 
     python -m workshop.tables.gpu [--contacts 4 16] [--problems 1000000] [--results NAME]
 
-The systems are boxes and bricks of random sizes and masses: one contact of a sphere; a box; towers of
-two and four boxes; walls of six and ten bricks. Each is thrown (0.3 m/s at random), and at rest (the
-velocity of a step, and 2 mm/s at random). They stay on the GPU; the time is that of the kernel, by
-CUDA's events, the least of three, and of the whole call besides. Every answer that is called
-converged is judged again on the CPU, by NumPy, in another formulation: projections on the cone, of a
-velocity from J. It takes under four minutes.
+The systems are boxes and bricks of random sizes and masses: one contact of a sphere; a box; towers
+of two and four boxes; walls of six and ten bricks. Each is thrown (0.3 m/s at random), and at rest
+(the velocity of a step, and 2 mm/s at random). They stay on the GPU; the time is that of the
+kernel, by CUDA's events, the least of three, and of the whole call besides. Every answer that is
+called converged is judged again on the CPU, by NumPy, in another formulation: projections on the
+cone, of a velocity from J. It takes under four minutes.
 """
 
 from __future__ import annotations
@@ -165,13 +165,8 @@ def judge(given: dict[str, Floats], r: Floats) -> Floats:
 
     own = natural(1 / size)
     apart = np.maximum(own * size, -u[..., 0])
-    return np.maximum.reduce(
-        [
-            length(natural(1.0)) / length(q),
-            length(own) / length(q / size[..., None]),
-            length(apart) / length(q),
-        ]
-    )
+    plain = np.maximum(length(natural(1.0)), length(apart)) / length(q)
+    return np.asarray(np.maximum(plain, length(own) / length(q / size[..., None])))
 
 
 def measure(nc: int, host: dict[str, Floats], at_rest: bool, form: str) -> dict[str, Any]:
@@ -224,9 +219,7 @@ def measure(nc: int, host: dict[str, Floats], at_rest: bool, form: str) -> dict[
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--contacts", nargs="+", type=int, choices=PROBLEMS, default=list(PROBLEMS))
     parser.add_argument(
         "--problems", type=int, help="of each kind, instead of the built-in numbers"

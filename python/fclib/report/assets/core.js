@@ -58,7 +58,7 @@ Fclib.set = (element, attributes) => {
   }
 };
 
-// names and what they are, where it is known
+// names and what they are, if it is known
 Fclib.facts = (pairs, kind = "facts") =>
   Fclib.h(
     "dl",

@@ -432,12 +432,12 @@ RANGES: dict[str, Any] = {
     "BoxesStack": ((6, 300), (1, 200), lambda p: p["size"]),
     "Capsules": ((6, 600), (1, 300), lambda p: 2 * p["radius"]),
     "Chain": ((48, 60), (8, 28), lambda p: p["thickness"]),
-    "KaplasTower": ((72, 864), (48, 1104), lambda p: p["thickness"]),
+    "KaplasTower": ((66, 864), (39, 1104), lambda p: p["thickness"]),
 }
 # penetration of stored states, of the diameter of the smallest body
 DEEPEST = 0.02
 # that of older versions, in which fast grains that strike are deeper
-HANDED = 0.2
+HANDED = 0.25
 DEEPER = {
     "Chute": 0.1,
     "DiscFlow": 0.1,

@@ -437,7 +437,7 @@ RANGES: dict[str, Any] = {
 # penetration of stored states, of the diameter of the smallest body
 DEEPEST = 0.02
 # that of older versions, in which fast grains that strike are deeper
-HANDED = 0.25
+HANDED = 0.2
 DEEPER = {
     "Chute": 0.1,
     "DiscFlow": 0.1,

@@ -147,6 +147,7 @@ PYTHON: dict[str, set[str]] = {
         "_batch",
         "_core",
         "_derivatives",
+        "_device",
         "_digest",
         "_geometry",
         "_registry",

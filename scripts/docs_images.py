@@ -272,7 +272,7 @@ def pages(wanted: list[str], site: Path, out: Path) -> None:
 
 
 def chromium_path() -> str | None:
-    """Of the system, where there is one; else Playwright's own."""
+    """Of the system, if there is one; else Playwright's own."""
     return next(filter(None, map(shutil.which, CHROMIUM)), None)
 
 

@@ -341,6 +341,7 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "simulators",
         "decks",
         "rr9118",
+        "fclib2024",
     }
     families = {tuple(origin.split("/")[:2]) for origin in origins}
     assert {name for name, _ in families} >= {"ladder", "rt444", *set_index.EXTENDED} - later

@@ -10,7 +10,7 @@
 #include "linalg/memory.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/pivoting.hpp"
-#include "methods/rolling_interior_point.hpp"
+#include "methods/product_interior_point.hpp"
 #include "methods/spectral_gradient.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
@@ -94,12 +94,6 @@ class Random {
   std::mt19937_64 generator_;
 };
 
-template <class Stage>
-constexpr bool factorises =
-    !std::is_same_v<Stage, GaussSeidelStage> && !std::is_same_v<Stage, SweepOnStage> &&
-    !std::is_same_v<Stage, SpectralGradientStage> &&
-    !std::is_same_v<Stage, ConjugateGradientsStage>;
-
 /// Looks now and then at the least error, and whether its rate reaches the tolerance within the
 /// steps that are paid for.
 class ConvergenceRate {
@@ -167,13 +161,8 @@ double Island<Cone>::solve(Vector& r, On on) {
 template <class Cone>
 void Island<Cone>::remember(const StageRule& rule) {
   if (swept_.size() > 0) return;
-  std::visit(
-      [&](const auto& method) {
-        if constexpr (requires { method.from; }) {
-          if (method.from == Start::swept || method.from == Start::associated) swept_ = best_;
-        }
-      },
-      rule.method);
+  const auto from = chosen_start(rule.method);
+  if (from == Start::swept || from == Start::associated) swept_ = best_;
 }
 
 template <class Cone>
@@ -193,8 +182,7 @@ bool Island<Cone>::applies(const StageRule& rule) const {
 
 template <class Cone>
 bool Island<Cone>::affordable(const StageRule& rule) {
-  return std::visit([&]<class Stage>(const Stage&) { return !factorises<Stage> || fits(system()); },
-                    rule.method);
+  return !factorises(rule.method) || fits(system());
 }
 
 template <class Cone>
@@ -220,19 +208,15 @@ double Island<Cone>::jointed() const {
 
 template <class Cone>
 void Island<Cone>::enter(const StageRule& rule) {
-  std::visit(
-      [&](const auto& method) {
-        tracker_.stage(rule.name, method.families, [&] {
-          const auto before = system_ ? system_->factorisations() : 0;
-          const double cpu = system_ ? system_->others_cpu() : 0;
-          own_factorisations_ = 0;
-          run(method);
-          if (system_) tracker_.add_cpu(system_->others_cpu() - cpu);
-          return std::pair(own_factorisations_ + (system_ ? system_->factorisations() : 0) - before,
-                           error_ <= tolerance_);
-        });
-      },
-      rule.method);
+  tracker_.stage(rule.name, families_of(rule.method), [&] {
+    const auto before = system_ ? system_->factorisations() : 0;
+    const double cpu = system_ ? system_->others_cpu() : 0;
+    own_factorisations_ = 0;
+    std::visit([&](const auto& method) { run(method); }, rule.method);
+    if (system_) tracker_.add_cpu(system_->others_cpu() - cpu);
+    return std::pair(own_factorisations_ + (system_ ? system_->factorisations() : 0) - before,
+                     error_ <= tolerance_);
+  });
 }
 
 template <class Cone>
@@ -440,7 +424,7 @@ double Island<Cone>::violation(const Vector& r) const {
 
 template <class Cone>
 void Island<Cone>::proximal(ProximalRules rules, Vector r) {
-  rules.own_rolling_rho = true;
+  rules.own_angular_rho = true;
   ProximalPoint<Cone> method(problem_, system());
   const double error =
       method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at, r); });
@@ -474,8 +458,7 @@ class Island<Cone>::ProximalPolish {
 
 template <class Cone>
 void Island<Cone>::run(const InteriorPointStage& stage) {
-  using Path = std::conditional_t<std::is_same_v<Cone, Coulomb<D>>, InteriorPoint<D>,
-                                  RollingInteriorPoint<D == 2 ? 3 : D>>;
+  using Path = typename InteriorPointFor<Cone>::type;
   InteriorPointRules rules = stage;
   if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
   Path method(problem_, system());
@@ -491,7 +474,7 @@ void Island<Cone>::run(const InteriorPointStage& stage) {
 
 template <class Cone>
 void Island<Cone>::run(const HeldBodiesStage& rules) {
-  if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
+  if constexpr (std::is_same_v<Cone, Coulomb<D>> && D <= 3) {
     if (bodies_.whole == nullptr) return;
     const bool all = bodies_.contacts.empty();
     const Primal part = all ? Primal() : restricted(*bodies_.whole, bodies_.contacts, D);
@@ -597,16 +580,15 @@ void Island<Cone>::run(const RandomStartsStage& rules) {
       auto r = start.template segment<D>(D * a);
       r[0] = size * unit[a] * std::pow(10.0, random.between(-2, 2));
       const Cone cone(problem_.friction, a);
-      for (int g = 0; g < Cone::groups; ++g) {
+      for_each_group<Cone>([&](auto g) {
+        constexpr int at = Cone::start(g);
+        constexpr int size = Cone::size(g);
         const double angle = random.between(0, 2 * std::numbers::pi);
         const double share = std::min(1.0, random.between(0, 2));
         const double radius = share * cone.coefficient(g) * r[0];
-        const int at = 1 + g * Cone::group_size;
-        r[at] = radius * (Cone::group_size > 1       ? std::cos(angle)
-                          : angle < std::numbers::pi ? 1
-                                                     : -1);
-        if (Cone::group_size > 1) r[at + Cone::group_size - 1] = radius * std::sin(angle);
-      }
+        r[at] = radius * (size > 1 ? std::cos(angle) : angle < std::numbers::pi ? 1 : -1);
+        if (size > 1) r[at + size - 1] = radius * std::sin(angle);
+      });
     }
     descend(newton, {.sweeps = random_sweeps}, random_limit, start);
     if (!done()) proximal({.max_factorisations = random_polish}, start);
@@ -617,8 +599,7 @@ void Island<Cone>::run(const RandomStartsStage& rules) {
 template <class Cone>
 void Island<Cone>::run(const NoSolutionStage& rules) {
   ReducedProblem frictionless = problem_;
-  frictionless.friction.mu.setZero();
-  frictionless.friction.mu_r.setZero();
+  frictionless.friction.for_each([](Vector& coefficients) { coefficients.setZero(); });
   const double usual = problem_.q.norm() / mean_diagonal(problem_);
   CoupledSystem system(frictionless);
   ProximalPoint<Cone> method(frictionless, system);

@@ -68,7 +68,7 @@ def span(values: Iterable[Any]) -> str:
 
 
 def figures(problem: Any) -> tuple[float, float]:
-    """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN where it does not."""
+    """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN if it does not."""
     data = Data.of_problem(problem)
     found = spectrum_of_W(data, asymmetry(data.W))
     if found is None and data.reduced is not None:
@@ -90,7 +90,7 @@ def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: in
 
 
 def off(published: str, values: Sequence[float], *, logarithm: bool) -> float:
-    """By how much of them the ends of ours differ from the published ones; 0 where none are."""
+    """By how much of them the ends of ours differ from the published ones; 0 if none are."""
     known = [float(value) for value in values if value is not None and np.isfinite(value)]
     if not published or not known:
         return 0.0
@@ -150,7 +150,7 @@ def exclusions(published: dict[str, str]) -> Iterator[dict[str, str]]:
 
 
 def possible(name: str, wide: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """The least and the largest of a figure where the two others are within bounds."""
+    """The least and the largest of a figure of those whose two others are within bounds."""
     (n, most_n), (nc, most_nc), (density, most_density) = (wide[other] for other in COUNTED)
     n, most_n, nc, most_nc = math.ceil(n), math.floor(most_n), math.ceil(nc), math.floor(most_nc)
     if name == "density":

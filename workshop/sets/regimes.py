@@ -3,7 +3,7 @@
     python -m workshop.sets.regimes OUT [FAMILY...]
 
 Each scene is simulated by nonsmooth Gauss-Seidel to 1e-3, as packings of thousands of contacts cost
-minutes a step where more is asked: a stored state is what a step begins from, and how it came about
+minutes a step if more is asked: a stored state is what a step begins from, and how it came about
 is no part of its problem. Or its states are those of a stored trajectory, under another law. Of the
 steps whose contacts are as many as published (published_sets.csv), some are kept, evenly spread by
 their number of contacts. Where other figures choose too, a step has all of them as published, to a
@@ -292,7 +292,7 @@ class Row:
     dof: int
     contacts: int
     depth: float  # largest penetration, of the smallest body's diameter
-    rank_ratio: float  # of W, as its conditioning; NaN where it is large, or nobody asks
+    rank_ratio: float  # of W, as its conditioning; NaN if it is large, or nobody asks
     conditioning: float
 
     @property

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from fclib import _core, _sequence
 from fclib._solve import Given, Problem
-from fclib.collections.guesses import guess_of
 from fclib.collections.library import Collection
+from fclib.collections.references import guess_of
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,11 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("n", "dof", "degrees of freedom of the bodies that contacts move"),
     ("family", "family", "the scene that it is from"),
     ("kind", "kind", "the set that its family is of first: masonry, granular, mixed, ..."),
-    ("formulation", "form", "in the abbreviations of RT-0444: G global, M mixed, R rolling"),
+    (
+        "formulation",
+        "form",
+        "in the abbreviations of RT-0444: G global, M mixed, R rolling, S spin, E coupled",
+    ),
     ("application", "application", "what such problems are from"),
     ("solved_by", "solved by", "share of the solvers that take it and solve it, for its class"),
     ("spacedim", "d", "components of a contact"),
@@ -107,6 +111,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("existence", "existence", "of a solution, and by what it is proved"),
     ("uniqueness", "uniqueness", "of the velocity"),
     ("same_as", "same as", "the first problem with the same data"),
+    ("trivial", "trivial", "why r = 0 solves it"),
     (
         "best_solver",
         "best solver",
@@ -353,11 +358,13 @@ def rated_by(solved: int, voters: int) -> dict[str, Any]:
 
 def law_of(formulation: str) -> str:
     """The law of contact of a formulation (RT-0444's abbreviations), in words."""
-    found = re.fullmatch(r"G?(R?)(M?)([23])DFC", formulation)
+    found = re.fullmatch(r"G?(S?)(E?)(R?)(M?)([23])DFC", formulation)
     if found is None:
         return formulation
-    rolling, mixed, space = found.groups()
-    words = "Coulomb friction" + (" and rolling friction" if rolling else "")
+    spin, coupled, rolling, mixed, space = found.groups()
+    others = [name for name, there in (("spin", spin), ("rolling", rolling)) if there]
+    words = "Coulomb friction" + (f" and {' and '.join(others)} friction" if others else "")
+    words += ", coupled" if coupled else ""
     place = "in the plane" if space == "2" else "in space"
     return f"{words} {place}{', with joints' if mixed else ''} ({formulation})"
 
@@ -440,7 +447,7 @@ class _Writer:
         site["views"] = views
         site["ratings"] = _records_of_classes(self.problems, self.campaigns)
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
-        site["problems"] = len(self.problems.rows)
+        site |= _numbers(self.problems.rows)
         site["recipes"] = recipes(sorted(formulations))
         site["files"] = self.downloads.kind
         site["module"] = browser.copy(self.module, self.folder) if self.module else 0
@@ -578,7 +585,7 @@ class _Writer:
         found = []
         for (collection, name), places in sorted(groups.items()):
             rows = [self.problems.rows[k] for k in places]
-            record: dict[str, Any] = {"name": name, "set": collection, "problems": len(rows)}
+            record: dict[str, Any] = {"name": name, "set": collection, **_numbers(rows)}
             record["ranges"] = {
                 key: [min(values), max(values)]
                 for key in ("nc", "n", "density", "mu_max")
@@ -625,6 +632,12 @@ def _histograms(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             record = {"key": key, "integer": is_whole(values)}
             found.append(record | {"edges": rounded(edges, DIGITS), "counts": counts.tolist()})
     return found
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """How many different problems there are, and how many copies of these or of others."""
+    copies = sum(bool(row.get("same_as")) for row in rows)
+    return {"problems": len(rows) - copies, "copies": copies}
 
 
 def _records_of_classes(problems: Problems, campaigns: Campaigns | None) -> list[dict[str, Any]]:
@@ -717,6 +730,7 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
         return found
     found["papers"] = citing.papers_of(about["citation"])
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
+    found["spin"] = about.get("spin", [])  # stores of earlier versions have none
     return found | {"known": about["options"]}
 
 

@@ -456,7 +456,7 @@ DEEPER = {
 }
 with collection_table.PUBLISHED.open(newline="") as file:
     SIZES = {
-        row["ours"]: row
+        row["ours"].split()[0]: row
         for row in csv.DictReader(file)
         if row["ours"].startswith(("rr9118/", "fclib2024/"))
     }

@@ -52,7 +52,7 @@ TOLERANCE: Final = 1e-8
 
 
 def sets() -> list[dict[str, str]]:
-    """The published sets: their figures, ours beside each, and how the names of its files begin."""
+    """The published sets: their figures, names of ours beside each, how its files' names begin."""
     with collection_table.PUBLISHED.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -105,12 +105,12 @@ def heading(quantile: float) -> str:
     return {0.0: "least", 0.5: "median", 1.0: "largest"}.get(quantile, f"{quantile:.0%}")
 
 
-def draw(path: Path, title: str, both: Sequence[tuple[str, Sequence[float]]], label: str) -> None:
+def draw(path: Path, title: str, drawn: Sequence[tuple[str, Sequence[float]]], label: str) -> None:
     """The shares of problems that have at most so many."""
     figures = importlib.import_module("matplotlib.figure")
     figure = figures.Figure(figsize=(4.5, 2.8), layout="constrained")
     axis = figure.subplots()
-    for (name, values), color in zip(both, ("#b3541e", "#3b6ea5"), strict=True):
+    for (name, values), color in zip(drawn, ("#b3541e", "#3b6ea5", "#5b8c3e"), strict=False):
         ordered = np.sort(values)
         axis.step(ordered, np.arange(1, len(ordered) + 1) / len(ordered), where="post",
                   label=f"{name} ({len(ordered)})", color=color)  # fmt: skip
@@ -162,9 +162,10 @@ def beside(ours: dict[str, Any], sample: int, limit: int) -> list[dict[str, str]
         head = {**theirs, "rank ratio": theirs["rank_ratio"], "within": ""}
         shown = {name: head[name] for name in collection_table.HEAD}
         table.append(shown | {"set": f"*{theirs['set']}*"})
-        if theirs["ours"] in ours:
-            left.pop(theirs["ours"], None)
-            table.append(row(theirs["ours"], theirs))
+        for name in theirs["ours"].split():
+            if name in ours:
+                left.pop(name, None)
+                table.append(row(name, theirs))
     return table + [row(name) for name in sorted(left)]
 
 
@@ -172,30 +173,29 @@ def distributions(theirs: Any, ours: dict[str, Any], own: Any) -> list[dict[str,
     """The quantiles of each set, and of ours under them; pictures, if they are asked for."""
     table: list[dict[str, Any]] = []
     swept: dict[str, list[float]] = {}
-    known = {row["set"]: row["ours"] for row in sets()}
+    known = {row["set"]: row["ours"].split() for row in sets()}
     for name in sorted(theirs):
-        family = known.get(name, "")
         for measure, values in theirs[name].items():
             table.append(line(f"*{name}*", measure, values))
-            if family not in ours:
-                continue
-            folder, rows = ours[family]
             column, label = MEASURES[measure]
-            if column:
-                mine = [row[column] for row in rows]
-            else:
-                if family not in swept:
+            drawn = [("published", values)]
+            for family in known.get(name, ()):
+                if family not in ours:
+                    continue
+                folder, rows = ours[family]
+                if not column and family not in swept:
                     swept[family] = [
                         sweeps_of(folder / (row["local_file"] or row["global_file"]), own.most,
                                   own.seconds)
                         for row in sample_of(rows, own.sample)
                     ]  # fmt: skip
-                mine = swept[family]
-            table.append(line(family, measure, mine))
-            if own.pictures:
+                mine = [row[column] for row in rows] if column else swept[family]
+                table.append(line(family, measure, mine))
+                drawn.append((family, mine))
+            if own.pictures and len(drawn) > 1:
                 own.pictures.mkdir(parents=True, exist_ok=True)
                 target = own.pictures / f"{name.replace('/', '-')}-{label}.png"
-                draw(target, name, [("published", values), (family, mine)], label)
+                draw(target, name, drawn, label)
     return table
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from fclib import _core
 from fclib._solve import Problem
 
+SUFFIXES = (".h5", ".hdf5")  # of a name that is that of a file, and not of a folder
 STEP = re.compile(r"(.+)#([0-9]+)", re.DOTALL)
 
 

@@ -1000,8 +1000,9 @@ def test_a_script_of_mujoco_is_recorded(tmp_path: Path) -> None:
 SPHERE = """
 import mujoco
 model = mujoco.MjModel.from_xml_string(
-    "<mujoco><option><flag autoreset='disable'/></option><worldbody><geom type='plane' size='1 1 1'/>"
-    "<body pos='0 0 .099'><freejoint/><geom size='.1'/></body>%s</worldbody></mujoco>")
+    "<mujoco><option><flag autoreset='disable'/></option><worldbody>"
+    "<geom type='plane' size='1 1 1'/><body pos='0 0 .099'><freejoint/>"
+    "<geom size='.1'/></body>%s</worldbody></mujoco>")
 data = mujoco.MjData(model)
 """
 CLOTH = (
@@ -1024,7 +1025,8 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
     for k, file in enumerate(files):
         assert fclib.digest(steps[k]) == fclib.digest(fclib.read(file))
         assert steps[k].info == fclib.read(file).info
-        assert steps.guesses(k) == fclib.read_guesses(file)
+        (guess,), (same,) = steps.guesses(k), fclib.read_guesses(file)
+        assert (guess.r == same.r).all()
     before = path.read_bytes()
     done = CliRunner().invoke(app, [*words, "--out", str(path)])
     assert done.exit_code == 1

@@ -14,9 +14,8 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib._sequence import SUFFIXES
 from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, steps_of, usage_error
-
-SUFFIXES = (".hdf5", ".h5")
 
 
 def command(

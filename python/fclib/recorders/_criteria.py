@@ -73,21 +73,20 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     u = np.reshape(_core.contact_merits(problem, solution)["u"], (-1, problem.spacedim))
     r = np.reshape(r, u.shape)
     # of size 1, so that no square or product overflows; each criterion is relative to ||r||
-    r = r / (np.abs(r).max(initial=0) or 1.0)
-    pace = np.abs(u).max(initial=0) or 1.0
+    r = r / float(np.abs(r).max(initial=0) or 1.0)
+    pace = float(np.abs(u).max(initial=0) or 1.0)
     u = u / pace
     mu = np.asarray(problem.mu)
     normal, slip = r[:, 0], np.linalg.norm(u[:, 1:], axis=1)
     friction, bound = np.linalg.norm(r[:, 1:], axis=1), mu * np.abs(normal)
     free = problem.condense().q if hasattr(problem, "condense") else problem.q
-    fastest = np.linalg.norm(np.reshape(free, u.shape), axis=1).max(initial=0)
-    fastest /= pace
+    fastest = float(np.linalg.norm(np.reshape(free, u.shape), axis=1).max(initial=0) / pace)
     power = fastest * np.linalg.norm(r, axis=1).sum()
     work = np.sum(r * u, axis=1)
     missing = np.sum(r[:, 1:] * u[:, 1:], axis=1) + mu * np.maximum(normal, 0) * slip
     return {
         "error": merit.error,
-        "penetration": share(np.max(-u[:, 0], initial=0), fastest),
+        "penetration": share(float(np.max(-u[:, 0], initial=0)), fastest),
         "tension": share(np.maximum(-normal, 0).sum(), np.abs(normal).sum()),
         "distance": share(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0), power),
         "cone": share(np.maximum(friction - mu * np.maximum(normal, 0), 0).sum(), bound.sum()),

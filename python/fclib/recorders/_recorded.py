@@ -11,10 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from fclib import _core
+from fclib._sequence import SUFFIXES
 from fclib.recorders._assemble import Assembled, Contacts
 
 Origin = Literal["exact", "reconstructed"]
-SEQUENCES = (".h5", ".hdf5")  # suffixes of a sequence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +212,7 @@ class Recording:
             self.left_out.append((number, str(error)))
 
     def _write(self, number: int, recorded: Recorded) -> None:
-        if self.path.suffix not in SEQUENCES:
+        if self.path.suffix not in SUFFIXES:
             self.path.mkdir(parents=True, exist_ok=True)
             recorded.write(self.path / f"{recorded.engine.lower()}-{number:06d}.hdf5")
             return

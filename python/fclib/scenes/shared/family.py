@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
+from fclib._regular import regular
 from fclib.scenes.shared import siconos_input
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
@@ -144,7 +145,7 @@ class Scene:
             return cls._of_siconos(path, time_step, friction, restitution, law, activation)
         if friction is not None:
             raise ValueError(f"{path.name} has its own friction; friction= is for an input.dat")
-        xml = path.read_text(encoding="utf-8")
+        xml = regular(path).read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
         resolved = resolve_packages(path.name, xml, packages or {})
         files, includes = references_of(path, resolved)

@@ -23,6 +23,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from fclib._regular import regular
 from fclib.scenes.shared import mjcf
 
 Vector = npt.NDArray[np.float64]
@@ -103,7 +104,7 @@ def files_of(path: Path) -> list[Path]:
 
 def lines(path: Path) -> list[tuple[int, list[str]]]:
     """The lines of a file that are not empty, with their numbers from 1 on, in words."""
-    text = path.read_text(encoding="utf-8").splitlines()
+    text = regular(path).read_text(encoding="utf-8").splitlines()
     return [(number, line.split()) for number, line in enumerate(text, 1) if line.strip()]
 
 
@@ -181,7 +182,7 @@ def mesh_of(path: Path, where: str, name: str) -> str:
 def points_of(path: Path) -> Vector:
     """(k x 3) the points of a .vtp file: as text, or binary, compressed by zlib or not."""
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        root = ElementTree.fromstring(regular(path).read_bytes())
         array = root.find("PolyData/Piece/Points/DataArray")
         if array is None:
             raise ValueError("it has no points")

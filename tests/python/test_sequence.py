@@ -680,6 +680,24 @@ def solved(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_sequence_without_a_step_is_no_success(tmp_path: Path) -> None:
+    path = tmp_path / "empty.h5"
+    record(path, 0)
+    assert len(Sequence(path)) == 0
+    for words in (("check", path), ("info", path), ("solve", path), ("judge", path)):
+        done = run(*words)
+        assert done.returncode == 1, words
+        assert f"{path}: /: is a sequence in which there is no step" in done.stderr
+    campaign = tmp_path / "empty.toml"
+    campaign.write_text(
+        'name = "empty"\nsolvers = ["auto"]\ntolerances = [1e-8]\n'
+        f'[[problems]]\nfiles = ["{path}"]\n'
+    )
+    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite")
+    assert done.returncode != 0
+    assert "is a sequence in which there is no step" in " ".join(done.stderr.split())
+
+
 def test_commands_take_a_sequence_and_its_steps(solved: Path) -> None:
     for command, status in (("info", None), ("check", "ok"), ("solve", "converged")):
         records = told(command, solved)

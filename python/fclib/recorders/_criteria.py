@@ -88,7 +88,7 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
         "error": merit.error,
         "penetration": share(float(np.max(-u[:, 0], initial=0)), fastest),
         "tension": share(np.maximum(-normal, 0).sum(), np.abs(normal).sum()),
-        "distance": share(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0), power),
+        "distance": share(float(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0)), power),
         "cone": share(np.maximum(friction - mu * np.maximum(normal, 0), 0).sum(), bound.sum()),
         "dissipation": share(np.maximum(missing, 0).sum(), fastest * bound.sum()),
         "energy": share(max(work.sum(), 0), power),

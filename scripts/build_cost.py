@@ -161,7 +161,7 @@ def duplicate_share(listings: Iterable[str]) -> tuple[int, int]:
 
 
 def text_of(folder: Path, objects: Iterable[str]) -> list[str]:
-    """What `nm -S` prints of each object; nothing where there is no nm that knows sizes."""
+    """What `nm -S` prints of each object; nothing if there is no nm that knows sizes."""
     if shutil.which("nm") is None or sys.platform == "darwin":
         return []
     command = ["nm", "-S", "--defined-only"]

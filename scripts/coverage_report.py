@@ -4,7 +4,7 @@
 .venv/bin/python scripts/coverage_report.py build/coverage --only-report the counts that are there
 .venv/bin/python scripts/coverage_report.py build/coverage tests/contract   of Python, these only
 
-It ends with an error where less than the asked part of the lines of a language is run.
+It ends with an error if less than the asked part of the lines of a language is run.
 
 Counters are not atomic, with which small loops take fifty times as long: threads may lose counts of
 a line, and whether it was run at all is what is asked.
@@ -152,14 +152,14 @@ def report(counted: Mapping[str, Lines], least: float) -> tuple[list[str], bool]
 
 
 def main() -> None:
-    """Count, report, and end with 1 where it is not enough."""
+    """Count, report, and end with 1 if it is not enough."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("build", type=Path, help="the folder of cmake --preset coverage")
     parser.add_argument("--only-report", action="store_true", help="run no test")
     parser.add_argument("--least", type=float, default=LEAST, help="per cent of lines")
-    parser.add_argument("tests", nargs="*", help="for pytest; all where none is named")
+    parser.add_argument("tests", nargs="*", help="for pytest; all if none is named")
     asked = parser.parse_args()
     build = asked.build.resolve()
     if not asked.only_report:

@@ -66,6 +66,7 @@ GROUPS = {
     "families-mixed": ("mixed",),
     "families-robots": ("robots",),
     "families-machines": ("machines",),
+    "families-quasistatic": ("quasistatic", "laws", "assembly", "flows"),
     "families-simulators": ("simulators",),
     "families-decks": ("decks",),
     "families-grains": ("granular", "rolling", "planar"),
@@ -271,7 +272,7 @@ def pages(wanted: list[str], site: Path, out: Path) -> None:
 
 
 def chromium_path() -> str | None:
-    """Of the system, where there is one; else Playwright's own."""
+    """Of the system, if there is one; else Playwright's own."""
     return next(filter(None, map(shutil.which, CHROMIUM)), None)
 
 

@@ -17,14 +17,14 @@ TOOL = Path(sys.executable).with_name("clang-tidy")
 
 
 def check(build: Path, source: Path) -> str:
-    """What clang-tidy finds in a file, empty where there is nothing."""
+    """What clang-tidy finds in a file; empty if there is nothing."""
     command = [str(TOOL), "-p", str(build), "--quiet", str(source)]
     done = subprocess.run(command, capture_output=True, text=True)
     return done.stdout + done.stderr if done.returncode else ""
 
 
 def main() -> None:
-    """Check them all, and exit with 1 where there is a finding."""
+    """Check them all, and exit with 1 if there is a finding."""
     if len(sys.argv) < 2:
         sys.exit(f"usage: {sys.argv[0]} BUILD [FILE...]")
     build = Path(sys.argv[1]).resolve()

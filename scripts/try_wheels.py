@@ -114,7 +114,7 @@ def build(found: Sequence[Interpreter], bundled: Path) -> None:
 
 
 def try_one(one: Interpreter, wheel: Path) -> str:
-    """What is wrong, empty where nothing is."""
+    """What is wrong; empty if nothing is."""
     scratch = None if one.root is None else one.root / "tmp"
     with tempfile.TemporaryDirectory(dir=scratch) as name:
         folder = Path(name)
@@ -137,7 +137,7 @@ def try_one(one: Interpreter, wheel: Path) -> str:
 
 
 def main() -> None:
-    """Build, if asked, try them all, and end with 1 where one fails."""
+    """Build, if asked, try them all, and end with 1 if one fails."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )

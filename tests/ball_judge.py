@@ -192,13 +192,19 @@ class Mass:
 
     def gram(self, A: Sparse) -> Balls:
         """The diagonal of A^T M^-1 A."""
-        result = []
-        for column in A.column_entries():
-            total = arb(0)
-            for (i, a), (j, b) in itertools.product(column, column):
-                if self.part[i] == self.part[j]:
-                    total += a * b * self.inverses[self.part[i]][self.place[i], self.place[j]]
-            result.append(total)
+        result = zeros(A.columns)
+        touched: list[dict[int, list[tuple[int, arb]]]] = [{} for _ in self.members]
+        for j, column in enumerate(A.column_entries()):
+            for i, a in column:
+                touched[self.part[i]].setdefault(j, []).append((self.place[i], a))
+        for rows, inverse, columns in zip(self.members, self.inverses, touched, strict=True):
+            own = arb_mat(len(rows), len(columns))
+            for k, entries in enumerate(columns.values()):
+                for place, a in entries:
+                    own[place, k] = a
+            moved = inverse * own
+            for k, (j, entries) in enumerate(columns.items()):
+                result[j] += sum((a * moved[place, k] for place, a in entries), arb(0))
         return result
 
     def spread(self, A: Sparse, impulses: Balls) -> Balls:

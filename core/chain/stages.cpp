@@ -94,12 +94,6 @@ class Random {
   std::mt19937_64 generator_;
 };
 
-template <class Stage>
-constexpr bool factorises =
-    !std::is_same_v<Stage, GaussSeidelStage> && !std::is_same_v<Stage, SweepOnStage> &&
-    !std::is_same_v<Stage, SpectralGradientStage> &&
-    !std::is_same_v<Stage, ConjugateGradientsStage>;
-
 /// Looks now and then at the least error, and whether its rate reaches the tolerance within the
 /// steps that are paid for.
 class ConvergenceRate {
@@ -167,13 +161,8 @@ double Island<Cone>::solve(Vector& r, On on) {
 template <class Cone>
 void Island<Cone>::remember(const StageRule& rule) {
   if (swept_.size() > 0) return;
-  std::visit(
-      [&](const auto& method) {
-        if constexpr (requires { method.from; }) {
-          if (method.from == Start::swept || method.from == Start::associated) swept_ = best_;
-        }
-      },
-      rule.method);
+  const auto from = chosen_start(rule.method);
+  if (from == Start::swept || from == Start::associated) swept_ = best_;
 }
 
 template <class Cone>
@@ -193,8 +182,7 @@ bool Island<Cone>::applies(const StageRule& rule) const {
 
 template <class Cone>
 bool Island<Cone>::affordable(const StageRule& rule) {
-  return std::visit([&]<class Stage>(const Stage&) { return !factorises<Stage> || fits(system()); },
-                    rule.method);
+  return !factorises(rule.method) || fits(system());
 }
 
 template <class Cone>
@@ -220,19 +208,15 @@ double Island<Cone>::jointed() const {
 
 template <class Cone>
 void Island<Cone>::enter(const StageRule& rule) {
-  std::visit(
-      [&](const auto& method) {
-        tracker_.stage(rule.name, method.families, [&] {
-          const auto before = system_ ? system_->factorisations() : 0;
-          const double cpu = system_ ? system_->others_cpu() : 0;
-          own_factorisations_ = 0;
-          run(method);
-          if (system_) tracker_.add_cpu(system_->others_cpu() - cpu);
-          return std::pair(own_factorisations_ + (system_ ? system_->factorisations() : 0) - before,
-                           error_ <= tolerance_);
-        });
-      },
-      rule.method);
+  tracker_.stage(rule.name, families_of(rule.method), [&] {
+    const auto before = system_ ? system_->factorisations() : 0;
+    const double cpu = system_ ? system_->others_cpu() : 0;
+    own_factorisations_ = 0;
+    std::visit([&](const auto& method) { run(method); }, rule.method);
+    if (system_) tracker_.add_cpu(system_->others_cpu() - cpu);
+    return std::pair(own_factorisations_ + (system_ ? system_->factorisations() : 0) - before,
+                     error_ <= tolerance_);
+  });
 }
 
 template <class Cone>

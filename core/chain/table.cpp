@@ -49,10 +49,6 @@ void for_each_method(const F& f) {
   }(std::make_index_sequence<std::variant_size_v<Method>>{});
 }
 
-std::string_view families_of(const StageRule& rule) {
-  return std::visit([](const auto& method) { return method.families; }, rule.method);
-}
-
 std::string listed(const std::vector<OptionInfo>& infos) {
   std::string result;
   for (const OptionInfo& info : infos) result += (result.empty() ? "" : ", ") + info.name;
@@ -124,6 +120,19 @@ StageRule parse_stage(std::string_view text, int line) {
 
 }  // namespace
 
+std::string_view families_of(const Method& method) {
+  return std::visit([](const auto& own) { return std::string_view(own.families); }, method);
+}
+
+std::optional<Start> chosen_start(const Method& method) {
+  return std::visit(
+      [](const auto& own) -> std::optional<Start> {
+        if constexpr (requires { own.from; }) return own.from;
+        return std::nullopt;
+      },
+      method);
+}
+
 Table parse_table(std::string_view text) {
   Table table;
   for (int line = 1; !text.empty(); ++line) {
@@ -138,7 +147,7 @@ Table parse_table(std::string_view text) {
       if (stage.empty()) continue;
       StageRule rule = parse_stage(stage, line);
       const auto same = std::find_if(table.begin(), table.end(), [&](const StageRule& other) {
-        return other.name == rule.name && families_of(other) != families_of(rule);
+        return other.name == rule.name && families_of(other.method) != families_of(rule.method);
       });
       if (same != table.end()) {
         Place{.name = rule.name, .line = line}.fail(

@@ -16,6 +16,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -370,10 +371,23 @@ struct StageRule {
 
 using Table = std::vector<StageRule>;
 
+/// The families of solvers that a method is of.
+std::string_view families_of(const Method& method);
+/// What a method starts from; nothing if its table does not choose that.
+std::optional<Start> chosen_start(const Method& method);
+
 /// Whether a method takes only Coulomb's cone.
 inline bool coulomb_alone(const Method& method) {
   return std::holds_alternative<AssociatedStage>(method) ||
          std::holds_alternative<HeldBodiesStage>(method);
+}
+
+/// Whether a method factorises a matrix.
+inline bool factorises(const Method& method) {
+  return !std::holds_alternative<GaussSeidelStage>(method) &&
+         !std::holds_alternative<SweepOnStage>(method) &&
+         !std::holds_alternative<SpectralGradientStage>(method) &&
+         !std::holds_alternative<ConjugateGradientsStage>(method);
 }
 
 /// The chain that a text describes. Throws Error (option) that names the stage and its line.

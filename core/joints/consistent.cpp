@@ -1,6 +1,5 @@
 #include "joints/consistent.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "linalg/factorization.hpp"
+#include "linalg/symmetric_eigen.hpp"
 
 namespace fclib {
 
@@ -147,12 +147,12 @@ std::optional<ConsistentJoints> consistent_joints(const GlobalProblem& problem) 
     if (!(length.array() > 0).all()) continue;  // an empty row contradicts or says nothing
     const Vector scaled_b = b.cwiseQuotient(length);
     const Vector inverse = length.cwiseInverse();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-        Eigen::MatrixXd(inverse.asDiagonal() * block(r, rows) * inverse.asDiagonal()));
+    const Eigenpairs eigen =
+        eigenpairs(inverse.asDiagonal() * block(r, rows) * inverse.asDiagonal());
     Eigen::Index idle = 0;
-    while (idle < size && eigen.eigenvalues()[idle] <= unit * unit) ++idle;
+    while (idle < size && eigen.values[idle] <= unit * unit) ++idle;
     if (idle == 0) continue;
-    const Eigen::MatrixXd z = eigen.eigenvectors().leftCols(idle);
+    const Eigen::MatrixXd z = eigen.vectors.leftCols(idle);
     const Vector contradiction = z.transpose() * scaled_b;
     const Vector terms = z.cwiseAbs().transpose() * scaled_b.cwiseAbs();
     if (!(contradiction.array().abs() > agreement * terms.array()).any()) continue;

@@ -107,8 +107,14 @@ Eigen::MatrixXd kernel(const Eigen::MatrixXd& a) {
   return size.cwiseInverse().asDiagonal() * (qr.colsPermutation() * basis);
 }
 
-Vector least_solution(const Eigen::MatrixXd& a, const Vector& b) {
-  return a.completeOrthogonalDecomposition().solve(b);
+Vector least_solution(const Eigen::MatrixXd& a, const Vector& b, std::optional<double> threshold) {
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors(a.rows(), a.cols());
+  if (threshold) factors.setThreshold(*threshold);
+  return factors.compute(a).solve(b);
+}
+
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& a) {
+  return a.completeOrthogonalDecomposition().pseudoInverse();
 }
 
 Vector projected(const Eigen::MatrixXd& columns, const Vector& x) {

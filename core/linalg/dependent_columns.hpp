@@ -1,6 +1,7 @@
 // Which columns of a matrix are combinations of others, up to rounding.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "linalg/matrix.hpp"
@@ -35,8 +36,12 @@ OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance)
 
 /// A basis of the kernel, up to rounding.
 Eigen::MatrixXd kernel(const Eigen::MatrixXd& a);
-/// The least x with the least ||A x - b||.
-Vector least_solution(const Eigen::MatrixXd& a, const Vector& b);
+/// The least x with the least ||A x - b||. Pivots below `threshold` of the largest one count as 0.
+/// Without it they do if rounding may have left them.
+Vector least_solution(const Eigen::MatrixXd& a, const Vector& b,
+                      std::optional<double> threshold = std::nullopt);
+/// B with the least ||A B - I||.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& a);
 /// The nearest point to x in what these columns span.
 Vector projected(const Eigen::MatrixXd& columns, const Vector& x);
 

@@ -1,8 +1,9 @@
 #include "merit/least_reactions.hpp"
 
 #include <Eigen/IterativeLinearSolvers>
-#include <Eigen/QR>
 #include <algorithm>
+
+#include "linalg/dependent_columns.hpp"
 
 namespace fclib {
 
@@ -33,9 +34,7 @@ Vector least_reactions(const SparseColumns& a, const RealVector& effect) {
   const auto cols = static_cast<double>(a.cols());
   Vector y;
   if (2 * rows * cols * std::min(rows, cols) <= dense_flops) {
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors(scaled.rows(), scaled.cols());
-    factors.setThreshold(dependent);
-    y = factors.compute(Eigen::MatrixXd(scaled)).solve(b);
+    y = least_solution(Eigen::MatrixXd(scaled), b, dependent);
   } else {
     Eigen::LeastSquaresConjugateGradient<SparseColumns> gradients;
     gradients.setTolerance(accuracy);

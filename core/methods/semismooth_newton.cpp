@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "linalg/spectral_norm.hpp"
+#include "linalg/symmetric_eigen.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
 

@@ -1,6 +1,5 @@
 #include "proof/no_solution.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -416,7 +415,7 @@ double distance_from_kernel(const Dense& A, const Vector& x) {
   const auto largest_sum = [&](const Dense& a) {
     return a.cwiseAbs().rowwise().sum().maxCoeff() * (1 + rounding);
   };
-  const Dense B = A.completeOrthogonalDecomposition().pseudoInverse();
+  const Dense B = pseudo_inverse(A);
   Dense off = A * B;
   off.diagonal().array() -= 1;
   const Dense unsure = rounding * (A.cwiseAbs() * B.cwiseAbs());

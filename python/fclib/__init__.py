@@ -57,6 +57,7 @@ from fclib._core import (
 )
 from fclib._core import version as __version__
 from fclib._derivatives import Gradient, Tangent, jvp, vjp
+from fclib._device import DeviceBatchResult
 from fclib._digest import digest
 from fclib._geometry import Bodies, Contacts
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
@@ -162,6 +163,7 @@ __all__ = [
     "Bodies",
     "ChainMethod",
     "Contacts",
+    "DeviceBatchResult",
     "Error",
     "FileError",
     "GlobalProblem",

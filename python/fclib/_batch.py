@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
+from fclib import _core, _device
 from fclib._equality import EqualByEntries
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -59,17 +59,21 @@ class BatchResult(EqualByEntries):
 
 
 def solve_batch(
-    W: npt.ArrayLike | Sequence[npt.ArrayLike],
-    q: npt.ArrayLike | Sequence[npt.ArrayLike],
-    mu: npt.ArrayLike | Sequence[npt.ArrayLike],
+    W: Any = None,
+    q: Any = None,
+    mu: Any = None,
     *,
+    jacobian: Any = None,
+    inverse_mass: Any = None,
+    velocity: Any = None,
     spacedim: int = 3,
-    contacts: npt.ArrayLike | None = None,
-    guess: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+    contacts: Any = None,
+    guess: Any = None,
     tol: float = 1e-8,
     threads: int = 1,
     time_limit: float | None = None,
-) -> BatchResult:
+    unsolved: Literal["cpu", "leave"] = "cpu",
+) -> Any:
     """Solve many local problems, u = W r + q with Coulomb's law, without Python between them.
 
     Small problems have their own method, which allocates no memory for each. Problems that it does
@@ -81,6 +85,12 @@ def solve_batch(
         q: (count, m) velocities without reactions; flat, or a list, as W.
         mu: (count, nc) coefficients of friction, or anything that NumPy broadcasts to it: (nc,), a
             number. Flat, or a list, as W.
+        jacobian: (count, m, coordinates) instead of W: W = J M^-1 J^T. If ``contacts`` is given:
+            (m of all problems, coordinates).
+        inverse_mass: M^-1 of the jacobian's coordinates: (coordinates,) or (count, coordinates) if
+            it is diagonal, or (count, coordinates, coordinates).
+        velocity: (count, coordinates) free velocities of the bodies: q = J velocity, and what is
+            given as q besides.
         spacedim: 3, or 2 for planar problems.
         contacts: (count,) numbers of contacts, if they differ between problems.
         guess: reactions to start from, in the shape of q.
@@ -88,6 +98,13 @@ def solve_batch(
         threads: number of threads that share the batch; 0: all of the machine. The result is the
             same.
         time_limit: [s] for all of them; problems left undone have the status time_limit.
+        unsolved: for arrays on a GPU: whether what it does not solve goes to the solver ``auto`` on
+            the CPU ("cpu"), or stays as it is ("leave"); then nothing waits for the GPU.
+
+    If an array is on a GPU (of CuPy, PyTorch, JAX, Warp), all is solved there, without a copy and in
+    the order of the caller's stream, and a ``DeviceBatchResult`` is returned. This needs
+    ``fclib[gpu]``. A problem with an entry that is not finite, or a negative mu, then has the status
+    "invalid", and r = 0.
 
     Returns:
         Arrays over the problems. A problem is ``converged`` only if the merit, recomputed in
@@ -106,6 +123,33 @@ def solve_batch(
         raise _core.OptionError(f"threads: {threads} is negative")
     if time_limit is not None and not time_limit > 0:
         raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    if unsolved not in ("cpu", "leave"):
+        raise _core.OptionError(f'unsolved: is {unsolved!r}, expected "cpu" or "leave"')
+    if jacobian is None and (inverse_mass is not None or velocity is not None):
+        raise _core.ProblemError("jacobian: is missing, and inverse_mass or velocity is given")
+    if jacobian is not None and W is not None:
+        raise _core.ProblemError("W: is given, and so is a jacobian")
+    if mu is None:
+        raise _core.ProblemError("mu: is missing")
+    if _device.on_device(W, q, mu, jacobian, inverse_mass, velocity, contacts, guess):
+        return _device.solve_batch(
+            W,
+            q,
+            mu,
+            jacobian=jacobian,
+            inverse_mass=inverse_mass,
+            velocity=velocity,
+            spacedim=spacedim,
+            contacts=contacts,
+            guess=guess,
+            tol=tol,
+            threads=threads,
+            time_limit=time_limit,
+            unsolved=unsolved,
+            on_cpu=solve_batch,
+        )
+    if jacobian is not None:
+        W, q = _of_bodies(spacedim, jacobian, inverse_mass, velocity, q, contacts)
     ragged = isinstance(W, (list, tuple)) and contacts is None
     if ragged:
         contacts = [np.size(one) // spacedim for one in _sequence("q", q)]
@@ -164,6 +208,55 @@ def solve_batch(
         math.inf if time_limit is None else time_limit,
     )
     return BatchResult(r, u, status, error, iterations, offsets, by_auto)
+
+
+def _of_bodies(
+    spacedim: int, jacobian: Any, inverse_mass: Any, velocity: Any, q: Any, contacts: Any
+) -> tuple[Any, Any]:
+    """W and q of problems given by their bodies; lists of them if the numbers of contacts vary."""
+    matrix = _floats("jacobian", jacobian)
+    if inverse_mass is None:
+        raise _core.ProblemError("inverse_mass: is missing")
+    if velocity is None and q is None:
+        raise _core.ProblemError("velocity: is missing, and so is q")
+    if matrix.ndim != (3 if contacts is None else 2):
+        raise _core.ProblemError(
+            f"jacobian: has the shape {matrix.shape}, expected (count, m, coordinates), or with "
+            "contacts (m of all problems, coordinates)"
+        )
+    nv = matrix.shape[-1]
+    count = len(matrix) if contacts is None else len(contacts)
+    inverse = _floats("inverse_mass", inverse_mass)
+    shapes = [(nv,), (count, nv), (count, nv, nv)]
+    if inverse.shape not in shapes:
+        raise _core.ProblemError(
+            f"inverse_mass: has the shape {inverse.shape}, expected one of {shapes}"
+        )
+    of_each, full = inverse.ndim > 1, inverse.ndim == 3
+    moving = None if velocity is None else _shaped("velocity", velocity, (count, nv))
+    sizes = None if contacts is None else spacedim * np.asarray(contacts)
+    rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])
+    if sizes is not None and len(matrix) != sizes.sum():
+        raise _core.ProblemError(f"jacobian: has {len(matrix)} rows, expected {sizes.sum()}")
+    if q is not None and sizes is None:
+        q = _shaped("q", q, matrix.shape[:2])
+    elif q is not None:
+        q = np.split(_shaped("q", _flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
+    found = [
+        _device.local(
+            one,
+            inverse[k] if of_each else inverse,
+            full,
+            None if moving is None else moving[k],
+            None if q is None else q[k],
+        )
+        for k, one in enumerate(rows)
+    ]
+    matrices, velocities = ([one[part] for one in found] for part in range(2))
+    if sizes is None:
+        m = matrix.shape[1]
+        return np.reshape(matrices, (count, m, m)), np.reshape(velocities, (count, m))
+    return matrices, velocities
 
 
 def _floats(name: str, values: Any) -> Floats:

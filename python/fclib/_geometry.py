@@ -10,7 +10,7 @@ the unit that the bodies name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -117,7 +117,7 @@ class Contacts(_Table):
     tangent: Numbers = field(
         metadata=column("nc", 3, float, "T1; T2 = N x T1, in the plane T1 is T")
     )
-    gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 where they overlap"))
+    gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 if they overlap"))
 
     def __post_init__(self) -> None:
         """Raises ValueError if the columns contradict each other."""
@@ -155,7 +155,7 @@ class Bodies(_Table):
     """
 
     name: str = field(metadata=column("nb", 1, str, "the names of the bodies, a line for each"))
-    moves: Integers = field(metadata=column("nb", 1, int, "1 where something moves it, 0: fixed"))
+    moves: Integers = field(metadata=column("nb", 1, int, "1 if something moves it, 0: fixed"))
     place: Numbers = field(metadata=column("nb", 3, float, "of the body's frame, in the world"))
     turn: Numbers = field(metadata=column("nb", 4, float, "of the body's frame"))
     shape_body: Integers = field(metadata=column("ns", 1, int, "the body of each shape"))
@@ -211,14 +211,42 @@ class Bodies(_Table):
     planar: Integers = field(
         default_factory=nothing(int),
         metadata=column(
-            "1", 1, int, "1 where all moves in the plane x, z; absent elsewhere", optional=True
+            "1", 1, int, "1 if all moves in the plane x, z; else absent", optional=True
+        ),
+    )
+    mass: Numbers = field(
+        default_factory=nothing(float),
+        metadata=column("nb", 1, float, "of each rigid body; 0 of a fixed one", optional=True),
+    )
+    inertia: Numbers = field(
+        default_factory=nothing(float, 3),
+        metadata=column(
+            "nb", 3, float, "principal moments of each rigid body, about its centre", optional=True
+        ),
+    )
+    center: Numbers = field(
+        default_factory=nothing(float, 3),
+        metadata=column("nb", 3, float, "centre of mass, in the body", optional=True),
+    )
+    axes: Numbers = field(
+        default_factory=nothing(float, 4),
+        metadata=column("nb", 4, float, "of the principal axes, in the body", optional=True),
+    )
+    velocity: Numbers = field(
+        default_factory=nothing(float),
+        metadata=column("n", 1, float, "v0, generalised, at the start of the step", optional=True),
+    )
+    impulse: Numbers = field(
+        default_factory=nothing(float),
+        metadata=column(
+            "n", 1, float, "of all known forces during the step: f = M v0 + impulse", optional=True
         ),
     )
     unit: str = field(
-        default="", metadata=column("1", 1, str, "of lengths; absent where it is m", optional=True)
+        default="", metadata=column("1", 1, str, "of lengths; absent if it is m", optional=True)
     )
     mass_unit: str = field(
-        default="", metadata=column("1", 1, str, "of masses; absent where it is kg", optional=True)
+        default="", metadata=column("1", 1, str, "of masses; absent if it is kg", optional=True)
     )
 
     def __post_init__(self) -> None:
@@ -253,6 +281,11 @@ class Bodies(_Table):
     def is_planar(self) -> bool:
         """Whether all moves in the plane x, z."""
         return bool(len(self.planar) and self.planar[0])
+
+    def started(self, velocity: Numbers, problem: Any) -> Bodies:
+        """The table with v0 (n), and with the impulse of all forces that gives f of a problem."""
+        impulse = np.asarray(problem.f) - problem.M @ velocity
+        return replace(self, velocity=velocity, impulse=impulse)
 
     def mesh(self, shape: int) -> tuple[Numbers, Integers] | None:
         """Vertices (k x 3) in the shape and faces (f x 4) of a shape; None if it has no mesh."""

@@ -62,7 +62,7 @@ def forward(
     for k in np.flatnonzero(~found.converged)[:1]:
         raise SolverError(
             f"problem {k} of {len(found)}: {found.statuses[found.status[k]]}, error"
-            f" {found.error[k]:.1e} where {tol:g} was asked for"
+            f" {found.error[k]:.1e}, and {tol:g} was asked for"
         )
     return found.r.reshape(q.shape), found.u.reshape(q.shape)
 

@@ -41,6 +41,7 @@ PURPOSE: Final = {
     "recorders": "simulators whose steps are recorded",
     "torch": "solving as a layer of PyTorch",
     "jax": "solving as a layer of JAX",
+    "gpu": "many small problems on a GPU",
 }
 # packages whose module has another name
 MODULE: Final = {
@@ -48,6 +49,7 @@ MODULE: Final = {
     "scikit-fem": "skfem",
     "drake": "pydrake",
     "pin": "pinocchio",
+    "cupy-cuda12x": "cupy",
 }
 
 
@@ -245,6 +247,22 @@ def check_rendering() -> Finding:
     return Finding(part, name, "ok" if found else "absent", found, purpose, "", remedy)
 
 
+def check_gpu() -> Finding:
+    """Whether batches can be solved on a GPU: CuPy, whichever of its packages, and a device."""
+    code = (
+        "from fclib import _device\n"
+        "missing = _device.missing()\n"
+        "print(missing or 'ok ' + _device.name())\n"
+    )
+    told, problem = run(code)
+    part, purpose = "gpu", "solve_batch with arrays on a GPU"
+    if problem:
+        return Finding(part, "GPU", "broken", "", purpose, problem, "pip install 'fclib[gpu]'")
+    if told.startswith("ok "):
+        return Finding(part, "GPU", "ok", told[3:], purpose)
+    return Finding(part, "GPU", "absent", "", purpose, "", told)
+
+
 def check_h5py() -> Finding | None:
     """Whether h5py, if it is installed, and fclib read each other's files in one process."""
     if importlib.util.find_spec("h5py") is None:
@@ -279,6 +297,7 @@ def examine() -> list[Finding]:
         *(partial(check_package, one) for one in packages),
         check_h5py,
         *(partial(check_adapter, adapter, known) for adapter in external.adapters()),
+        check_gpu,
         check_rendering,
     ]
     with ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1)) as pool:

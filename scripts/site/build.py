@@ -125,7 +125,7 @@ def pages(quick: bool, report: str) -> Iterator[tuple[str, str | bytes]]:
 
 
 def figures() -> Iterator[tuple[str, str | bytes]]:
-    """What solves on docs/contact-problem.md, where `make wasm` has built the module for it."""
+    """What solves on docs/contact-problem.md, if `make wasm` has built the module for it."""
     script = (HERE / "assets" / "contact.js").read_text(encoding="utf-8")
     if all((MODULE / name).is_file() for name in MODULE_FILES):
         script = script.replace("const BUILT = false", "const BUILT = true")

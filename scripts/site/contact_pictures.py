@@ -35,7 +35,7 @@ class _Quiet(SimpleHTTPRequestHandler):
 
 
 def main() -> int:
-    """Draw all figures of the page; 1 where there is no module."""
+    """Draw all figures of the page; 1 if there is no module."""
     out = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else build.ROOT / "docs" / "images"
     names = re.findall(r'data-figure="(\w+)"', PAGE.read_text(encoding="utf-8"))
     figures = dict(build.figures())

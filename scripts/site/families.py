@@ -19,7 +19,7 @@ Kind = type[scenes.Described]
 
 
 def pages(draws: bool, report: str = "") -> Iterator[tuple[str, str | bytes]]:
-    """The pages, their index, and pictures where they are asked for and something can draw here.
+    """The pages, their index, and pictures if they are asked for and something can draw here.
 
     `report` is the address of a report, for links to it.
     """
@@ -37,7 +37,7 @@ def pages(draws: bool, report: str = "") -> Iterator[tuple[str, str | bytes]]:
 
 
 def index(families: dict[str, Kind], drawn: set[str], report: str) -> str:
-    """The sets and the families, in tables, with a small picture where one is drawn."""
+    """The sets and the families, in tables, with a small picture if one is drawn."""
     lines = [
         "# Families",
         "",
@@ -66,7 +66,7 @@ def distinct(name: str, kind: Kind) -> int | None:
 
 
 def browsed(report: str, place: str, text: str) -> list[str]:
-    """A paragraph that links to a place in the report, where one is served."""
+    """A paragraph that links to a place in the report, if one is served."""
     return ["", f"[{text}]({report}/index.html{place})", ""] if report else []
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from docutils import nodes
 from latex2mathml.converter import convert
 
-# an accent that is drawn apart touches the letter where the browser has no font for formulas
+# an accent that is drawn apart touches the letter if the browser has no font for formulas
 HAT = '<mover accent="true"><mi>u</mi><mo>&#x0005E;</mo></mover>'
 WHOLE = '<mi style="font-style: italic">û</mi>'
 

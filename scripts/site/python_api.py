@@ -89,7 +89,7 @@ def decorated(node: ast.FunctionDef, name: str) -> bool:
 
 
 def signature(node: ast.FunctionDef) -> str:
-    """The head of a function, folded where it is long."""
+    """The head of a function, folded if it is long."""
     head = f"{node.name}({ast.unparse(node.args)})"
     head = head.replace("numpy.typing.", "").replace("numpy.", "")
     if len(head) > 88:

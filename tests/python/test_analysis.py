@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 import fclib
 from fclib import analysis
-from fclib.analysis import _existence, _spectrum
+from fclib.analysis import _brief, _existence, _spectrum
 from fclib.analysis._brief import brief
 from fclib.analysis._data import Data
 from helpers import (
@@ -894,3 +894,88 @@ def test_joints_of_huge_units_end_in_no_traceback() -> None:
             s=rng.normal(size=4),
         )
         assert analysis.analyze(problem, time_limit=2).existence.verdict in analysis.VERDICTS
+
+
+# ---- a quick look
+
+load: Any = fclib.load
+
+
+def singular(a: Any, bound: float = 1e-12) -> tuple[int, float]:
+    """Rank and conditioning by all singular values."""
+    values = np.linalg.svd(a.toarray(), compute_uv=False)
+    kept = values[values > bound * values[0]]
+    return len(kept), kept[0] / kept[-1]
+
+
+def test_quick_spectra_are_those_of_all_singular_values() -> None:
+    """Symmetric, asymmetric, long and wide; of blocks that are found directly, and by A^T A."""
+    random = np.random.default_rng(5)
+    low = sp.csc_array(random.standard_normal((40, 12)) @ random.standard_normal((12, 40)))
+    wide = sp.csc_array(random.standard_normal((30, 90)))
+    for a in (low, sp.csc_array(low + low.T), wide, wide.T.tocsc(), sp.block_diag([low, wide])):
+        a = sp.csc_array(a)
+        rank, conditioning = singular(a)
+        for limit in (1000, 100):
+            found = _spectrum.quick_spectrum(a, limit)
+            assert not found.estimate
+            assert found.rank == rank
+            assert found.conditioning == pytest.approx(conditioning, rel=1e-6)
+
+
+def test_large_blocks_are_squared_or_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(6)
+    # a chain: one block, and no structural defect
+    a = sp.csc_array(sp.diags_array([random.uniform(1, 2, 200)] * 2, offsets=[0, 1]))
+    rank, conditioning = singular(a)
+    monkeypatch.setattr(_spectrum, "SVD", 50)
+    squared = _spectrum.quick_spectrum(a, 300)
+    assert "A^T A" in squared.method
+    assert squared.rank == rank
+    assert squared.conditioning == pytest.approx(conditioning, rel=1e-4)
+    rough = _spectrum.quick_spectrum(a, 100)
+    assert rough.estimate
+    assert "60 steps of Lanczos" in rough.method
+    assert rough.rank == rank
+    assert 1 < rough.conditioning <= conditioning * (1 + 1e-9)
+    assert rough.largest == pytest.approx(squared.largest, rel=1e-2)
+    # what is singular does not look ill-conditioned
+    thin = random.standard_normal((120, 30))
+    gram = sp.csc_array(thin @ thin.T)
+    assert _spectrum.quick_spectrum(gram, 100).conditioning <= singular(gram)[1] * (1 + 1e-6)
+    # all steps give all values
+    small = sp.csc_array(random.standard_normal((20, 20)))
+    exact = np.linalg.svd(small.toarray(), compute_uv=False)
+    values = _spectrum.bidiagonal(small.__matmul__, small.T.__matmul__, 20)
+    np.testing.assert_allclose(values, exact, rtol=1e-8)
+
+
+def test_brief_facts_of_joints_and_of_an_asymmetric_W(monkeypatch: pytest.MonkeyPatch) -> None:
+    linked = load("tiny/FourBar/0150")
+    found = brief(linked, linked.condense())
+    reduced = linked.condense().eliminate()
+    assert set(found.matrix_info) == {"M", "H", "G", "W", "V", "R"}
+    assert all(one.rank and one.conditioning for one in found.matrix_info.values())
+    rank, _ = singular(sp.csc_array(reduced.W))
+    assert found.matrix_info["W"].rank == found.record["rank_W"] == rank
+    assert "of W' = W - V R^-1 V^T by" in found.matrix_info["W"].comment
+    W = np.eye(6) + 0.2 * np.triu(np.ones((6, 6)), 1)
+    skew = fclib.LocalProblem(spacedim=3, W=W, q=np.array([-1.0, 0, 0] * 2), mu=[0.5, 0.5])
+    found = brief(skew, skew)
+    rank, conditioning = singular(sp.csc_array(W))
+    assert found.matrix_info["W"].rank == rank
+    assert found.matrix_info["W"].conditioning == pytest.approx(conditioning, rel=1e-2)
+    assert "not symmetric by 0.2" in found.words
+    # larger than what is found, the rank is a bound, and says so
+    monkeypatch.setattr(_brief, "RANKS", 20)
+    monkeypatch.setattr(_spectrum, "SVD", 5)
+    for problem in (linked, load("tiny/KaplasTower/0030")):
+        rough = brief(problem, problem.condense())
+        info = rough.matrix_info["W"]
+        assert "at most" in info.comment
+        assert "Lanczos" in info.comment
+        exact = analysis.analyze(problem).record
+        assert info.rank >= exact["rank_W"]
+        assert info.conditioning <= 1.01 * exact["conditioning_W"]
+        assert rough.record["rank_W"] is None
+        assert "The rank of W" in rough.words

@@ -18,7 +18,7 @@ import fclib
 from fclib import bench, cli
 from fclib.bench import cluster, pool, profiles
 from fclib.bench.job import Guess, Job, Record
-from fclib.collections.guesses import guess_of
+from fclib.collections.references import guess_of
 from fclib.report.runs import Campaigns
 from helpers import planted_local
 

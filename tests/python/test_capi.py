@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import capi_abi
 import fclib
@@ -25,6 +26,7 @@ from capi_library import (
     compile_program,
     library_folder,
 )
+from fclib.cli import app
 from helpers import Array, dense, modified, planted_global, planted_local, project
 
 # where libfclib 3.1 is installed, or unpacked with what it needs
@@ -266,8 +268,8 @@ def test_the_bodies_of_the_example_are_drawn(programs: Path, tmp_path: Path) -> 
     assert force[:4].sum() == pytest.approx(force[4] + 9.81e-3)
     for name in ("view", "bare"):
         page = tmp_path / f"{name}.html"
-        fclib_view = [sys.executable, "-m", "fclib", "view", str(path), "--out", str(page)]
-        subprocess.run(fclib_view, check=True, capture_output=True)
+        shown = CliRunner().invoke(app, ["view", str(path), "--out", str(page)])
+        assert shown.exit_code == 0, shown.output
         assert ('"ball"' in page.read_text()) == (name == "view")
         fclib.write(path, problem.replace(contacts=None, bodies=None), mode="replace")
     valgrind(program, path)

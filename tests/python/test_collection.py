@@ -8,15 +8,18 @@ import http.server
 import importlib
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -29,11 +32,20 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog, published, ratings, references, set_index
+from fclib.collections import (
+    archives,
+    catalog,
+    published,
+    ratings,
+    references,
+    set_index,
+    trajectory,
+)
 from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
 from fclib.collections.set_index import DATA
 from fclib.simulate import control_of
+from workshop.sets import metadata
 
 FAMILIES = collections.families()
 
@@ -350,18 +362,80 @@ def test_files_say_what_is_cheaply_known(built: Path, tmp_path: Path) -> None:
         assert whole.matrix_info["M"].rank == whole.n
         for problem in (whole, local):
             assert "Existence: exists by Slater" in problem.info.math_info
-            assert "Left out: conditioning of H" in problem.info.math_info
+            assert "Left out: conic programs" in problem.info.math_info
             # of u and of r apart: four contacts under a box move nothing in more than one way
             assert "Velocity: u" in problem.info.math_info
             assert "Reactions: not unique: at the solution at hand" in problem.info.math_info
         assert row["existence"] == "exists by Slater"
-        assert row["conditioning_H"] is None
+        singular = np.linalg.svd(whole.H.toarray(), compute_uv=False)
+        kept = singular[singular > 1e-12 * singular[0]]
+        assert (whole.matrix_info["H"].rank, row["rank_H"]) == (len(kept), len(kept))
+        assert row["conditioning_H"] == pytest.approx(kept[0] / kept[-1], rel=1e-2)
         # the digest is of the data
         assert fclib.digest(whole) == row["digest"]
     alone = collections.build([plan(problems=2, references=False)], tmp_path, pictures=False)
     for row in alone.to_pylist():
         assert not read(tmp_path / row["local_file"]).matrix_info
     assert not set(catalog.ANALYSIS) & set(alone.column_names)
+
+
+def test_every_file_has_all_metadata(built: Path) -> None:
+    """Read with h5py alone."""
+    paths = [*built.rglob("*.hdf5"), *(DATA / "tiny").rglob("*.hdf5")]
+    assert len(paths) > 30
+    for path in paths:
+        with h5py.File(path) as file:
+            assert list(metadata.missing(file)) == [], path
+
+
+def test_metadata_that_is_missing_is_named(built: Path, tmp_path: Path) -> None:
+    path = tmp_path / "one.hdf5"
+    shutil.copyfile(built / "small/BoxesStack/0005-global.hdf5", path)
+    gone = ("fclib_global/H/conditioning", "fclib_global/info/title", "guesses", "bodies/velocity")
+    with h5py.File(path, "r+") as file:
+        for name in gone:
+            del file[name]
+        del file["solution"]
+        assert list(metadata.missing(file)) == [
+            "info/title",
+            "H/conditioning",
+            "solution, or why there is none",
+            "guess, or why there is none",
+            "bodies/velocity",
+        ]
+
+
+def test_guesses_do_not_depend_on_what_is_built(built: Path, tmp_path: Path) -> None:
+    """Zero at the first contact; else what the same contacts had in the step before."""
+    some = collections.build([plan(count=4)], tmp_path / "some", pictures=False).to_pylist()
+    numbers = [row["number"] for row in some]
+    assert numbers == [0, 4, 7, 11]
+    for row in some:
+        (own,) = fclib.read_guesses(tmp_path / "some" / row["global_file"])
+        (same,) = fclib.read_guesses(built / row["global_file"])
+        np.testing.assert_array_equal(own.r, same.r)
+        assert own.r.any() == (row["number"] > 0)
+    # states without those of the step before have it stored with them
+    thinned = replace(plan(), chosen=tuple(numbers))
+    rows = collections.build([thinned], tmp_path / "thinned", pictures=False).to_pylist()
+    states = collections.read_trajectory(tmp_path / "thinned/small/BoxesStack/states.trajectory")
+    assert len(states) == len(states.guess) == 4
+    for row in rows:
+        path = tmp_path / "thinned" / row["global_file"]
+        (own,) = fclib.read_guesses(path)
+        (same,) = fclib.read_guesses(built / row["global_file"])
+        assert "guess" not in fclib.read_attributes(path, "info")
+        # the simulation was solved to other digits, and reactions of a box are not unique
+        normal = [guess.r[::3].sum() for guess in (own, same)]
+        assert normal[0] == pytest.approx(normal[1], rel=1e-3)
+    # and where nobody knows it, the file says so
+    bare = tmp_path / "bare" / "small/BoxesStack-1.trajectory"
+    trajectory.write(bare, replace(states, guess=()))
+    unknown = replace(thinned, trajectory=bare)
+    rows = collections.build([unknown], tmp_path / "unknown", pictures=False).to_pylist()
+    last = tmp_path / "unknown" / rows[-1]["global_file"]
+    assert fclib.read_guesses(last) == []
+    assert "do not have the step before" in str(fclib.read_attributes(last, "info")["guess"])
 
 
 def test_a_file_says_that_its_problem_has_no_solution(tmp_path: Path) -> None:
@@ -635,6 +709,51 @@ def test_verify_fails_exactly_if_check_does(built: Path, tmp_path: Path, mass: f
         assert verdict.ok == ok == (fclib.merit(problem, read_solution(target)).error <= 1e-8)
         seen.add(ok)
     assert seen == {True, False}
+
+
+def test_a_file_without_a_solution_says_why_or_is_refused(tmp_path: Path) -> None:
+    """By `verify` as by `check`, whatever the catalogue says."""
+    table = collections.build([plan(problems=2, references=False)], tmp_path, pictures=False)
+    rows = table.to_pylist()
+    paths = [tmp_path / path for row in rows for path, _ in catalog.files_of(row)]
+    for path in paths:
+        assert fclib.read_attributes(path, "info")["solution"] == "none was looked for"
+        assert invoke("check", path).exit_code == 0
+    assert all(verdict.ok for verdict in collections.verify(tmp_path))
+    fclib.write(paths[0], read(paths[0]))  # and no longer says why
+    rows[0]["global_sha256"] = catalog.sha256(paths[0])
+    catalog.write_catalog(tmp_path / catalog.FILE, rows)
+    assert invoke("check", paths[0]).exit_code == 1
+    wrong = [verdict for verdict in collections.verify(tmp_path) if not verdict.ok]
+    assert [(one.path, one.status) for one in wrong] == [(rows[0]["global_file"], "no solution")]
+    assert "does not say why" in wrong[0].message
+
+
+def test_r_0_is_not_the_reference_of_what_has_other_solutions(tmp_path: Path) -> None:
+    """Klarbring's mass on springs with much friction, five of them side by side."""
+    block = np.linalg.inv([[2.0, -1.0], [-1.0, 1.0]])
+    many = fclib.LocalProblem(
+        spacedim=2, W=np.kron(np.eye(5), block), q=[1.0, 3.5] * 5, mu=[2.0] * 5
+    )
+    found = references.find(many, "auto", 1e-8)
+    assert not found.solution.r.any()
+    others = references.others(many, found)
+    assert others
+    for one in others:
+        assert fclib.merit(many, one).error <= 1e-8
+        assert one.r.any()
+    best = references.best_first(found, many, [found.solution, *others], "nsn-ac")
+    assert best.ok
+    assert best.solution.r.any()
+    assert best.solver == "nsn-ac"
+    # with little friction there is only one, and what is solved otherwise has no need of others
+    slippery = many.replace(mu=0.1 * many.mu)
+    assert references.others(slippery, references.find(slippery, "auto", 1e-8)) == []
+    assert references.others(many, best) == []
+    path = tmp_path / "many.hdf5"
+    references.write(path, many, best, (), [found.solution, *others])
+    assert len(fclib.read_solutions(path)) == 1 + len(others)
+    assert read_solution(path).r.any()
 
 
 def test_a_cut_build_leaves_a_catalogue_of_what_is_finished(
@@ -918,17 +1037,18 @@ def test_a_set_counts_its_families_without_states_too() -> None:
 
 
 def test_copies_are_counted_once() -> None:
-    """A tower that rests is one problem, however many steps it does so."""
-    states = published.digests("rt444/KaplasTower", set_index.version_of("rt444/KaplasTower"))
+    """A gripper that holds still is one problem, however many steps it does so."""
+    states = published.digests("robots/Gripper", set_index.version_of("robots/Gripper"))
     if not states:
         pytest.skip("its states are not stored here")
     rows = [json.loads(one) for one in invoke("collection", "list", "--json").output.splitlines()]
     told = [*map(json.loads, invoke("collection", "list", "--sets", "--json").output.splitlines())]
     own, sets = {row["family"]: row for row in rows}, {row["set"]: row for row in told}
-    assert own["KaplasTower"]["problems"] == len(states)
-    assert own["KaplasTower"]["distinct"] == len(set(states.values())) < len(states)
+    assert own["Gripper"]["problems"] == len(states)
+    assert own["Gripper"]["distinct"] == len(set(states.values())) < len(states)
     assert own["LowWall"]["distinct"] is None
-    assert sets["rt444"]["distinct"] < sets["rt444"]["problems"]
+    assert sets["robots"]["distinct"] < sets["robots"]["problems"]
+    assert sets["rt444"]["distinct"] == sets["rt444"]["problems"]
     assert sets["standard"]["distinct"] == sets["standard"]["problems"]
 
 

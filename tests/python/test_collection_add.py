@@ -66,6 +66,14 @@ def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.Mo
         assert (told["error"], told["solver"]) == (row["error"], row["solver"])
     assert [row["solver"] for row in rows].count("the file") == 2
     assert all(verdict.ok for verdict in collections.verify(out))
+    # nor does a copy whose solution nobody looked for keep silent
+    quick = tmp_path / "quick"
+    arguments = ["collection", "add", str(source), "--no-references", "--out", str(quick)]
+    CliRunner().invoke(app, arguments)
+    paths = list(quick.glob("from_afar/*/*.hdf5"))
+    assert sum(read_solution(path) is None for path in paths) == 1
+    assert CliRunner().invoke(app, ["check", *map(str, paths)]).exit_code == 0
+    assert all(verdict.ok for verdict in collections.verify(quick))
     monkeypatch.setenv("FCLIB_COLLECTION", str(out))
     assert len(fclib.collection("from_afar")) == 3
     with pytest.raises(KeyError, match="no set"):

@@ -1,5 +1,6 @@
 """Where contacts are and what touches there: /contacts and /bodies of a file."""
 
+import json
 import pickle
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fclib
 from fclib import scenes
@@ -197,3 +199,36 @@ def test_limits_have_a_joint_and_no_shape() -> None:
     assert contacts.body.tolist() == [[0, 1]]
     assert not contacts.normal.any()
     assert problem.bodies.names == ["world", "rod"]
+
+
+@pytest.mark.parametrize("own", ["rt444/KaplasTower", "tiny/FourBar", "robots/Pusher"])
+def test_f_follows_from_the_file_alone(own: str, tmp_path: Path) -> None:
+    """From masses, gravity and v0 of free bodies; from v0 and the impulse of any."""
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("mujoco")
+    from fclib import collections
+    from fclib.collections import published
+
+    if published.root() is None:
+        pytest.skip("the package of trajectories is not here")
+    plan = collections.plan_of(own, references=False, form="global")
+    plan = plan.only([int(plan.numbers()[len(plan.numbers()) // 2])])
+    (row,) = collections.build([plan], tmp_path, pictures=False).to_pylist()
+    path = tmp_path / row["global_file"]
+    with h5py.File(path) as file:
+        group = file["fclib_global"]
+        entries = group["M/x"][()], (group["M/i"][()], group["M/p"][()])
+        size = int(group["M/m"][0])
+        M = sp.coo_array(entries, shape=(size, size)).tocsr()
+        f = group["vectors/f"][()]
+        v0, impulse = (file[f"bodies/{part}"][()] for part in ("velocity", "impulse"))
+        np.testing.assert_allclose(M @ v0 + impulse, f, rtol=1e-12, atol=1e-14 * abs(f).max())
+        mass, moves = file["bodies/mass"][()], file["bodies/moves"][()]
+        assert (mass[moves == 1] > 0).all()
+        assert (file["bodies/inertia"][()].reshape(-1, 3)[moves == 1] > 0).all()
+        if own == "rt444/KaplasTower":  # free blocks: gravity alone, and the masses are those of M
+            h = json.loads(file["fclib_global/info/description"][()].splitlines()[-1])["time_step"]
+            weight = impulse.reshape(-1, 6)[:, 2] / h
+            masses = -weight / 9.81
+            assert set(np.round(masses, 9)) <= set(np.round(mass[moves == 1], 9))
+            np.testing.assert_allclose(M.diagonal().reshape(-1, 6)[:, 0], masses, rtol=1e-9)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import math
 import shutil
+import signal
 import subprocess
+import threading
+from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
 
@@ -391,6 +395,71 @@ def test_inertia_of_a_capsule_is_that_of_its_points() -> None:
     np.testing.assert_allclose(body.inertia, expected, rtol=0.02)
 
 
+# ---- what is stored
+
+
+@pytest.mark.parametrize("name", sorted(rt444_states.PROBLEMS))
+def test_stored_problems_follow_from_bodies_and_contacts(name: str) -> None:
+    """H and w of ten problems from their tables, M and f from masses and velocities; by NumPy."""
+    path = published.path_of(f"rt444/{name}", set_index.version_of(f"rt444/{name}"))
+    states = None if path is None else trajectory.read(path)
+    if states is None or states.handed is None:
+        pytest.skip("no states of another engine are stored here")
+    scene = _rt444_scenes.SCENES[name]
+    h, theta = scene.step, scene.theta
+    for place in np.linspace(0, len(states) - 1, 10).astype(int).tolist():
+        problem: Any = states.problem(place).problem
+        contacts, bodies = problem.contacts, problem.bodies
+        moving = np.flatnonzero(bodies.moves)
+        touched = np.intersect1d(contacts.body, moving)
+        assert problem.n == 6 * len(touched)
+        twist = states.velocity[place].reshape(-1, 6)[np.searchsorted(moving, touched)]
+        H, M, f = np.zeros((problem.n, problem.m)), np.zeros((problem.n, problem.n)), []
+        for c in range(problem.nc):
+            N, T1 = contacts.normal[c], contacts.tangent[c]
+            frame = np.stack((N, T1, np.cross(N, T1)), axis=1)
+            for body, sign in zip(contacts.body[c], (-1, 1), strict=True):
+                if body in touched:
+                    first = 6 * int(np.searchsorted(touched, body))
+                    R = rotations(bodies.turn[body][None])[0]
+                    arm = contacts.point[c] - bodies.place[body]
+                    columns = slice(3 * c, 3 * c + 3)
+                    H[first : first + 3, columns] += sign * frame
+                    H[first + 3 : first + 6, columns] += sign * R.T @ cross(arm) @ frame
+        for i, (body, v) in enumerate(zip(touched, twist, strict=True)):
+            solid, omega = states.handed.solids[body], v[3:]
+            inertia = np.diag(inertia_of(solid))
+            own = np.zeros((6, 6))
+            own[:3, :3] = solid.mass * np.eye(3)
+            own[3:, 3:] = inertia + h * theta * (cross(omega) @ inertia - cross(inertia @ omega))
+            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = own
+            pushed = own @ v
+            pushed[2] -= h * solid.mass * 9.80665
+            pushed[3:] -= h * np.cross(omega, inertia @ omega)
+            f.append(pushed)
+        for found, expected in (
+            (dense(problem.H), H),
+            (dense(problem.M), M),
+            (np.asarray(problem.f), np.concatenate(f)),
+        ):
+            assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+        np.testing.assert_array_equal(problem.w, 0)
+        np.testing.assert_array_equal(problem.mu, scene.mu)
+
+
+def inertia_of(solid: handed.Solid) -> list[float]:
+    """Of a homogeneous box or capsule, in its body's axes."""
+    if solid.kind == "box":
+        x, y, z = np.square(solid.size) * solid.mass / 3
+        return [y + z, x + z, x + y]
+    radius, half = solid.size
+    share = 3 * half / (3 * half + 2 * radius)  # of the cylinder; it lies along y
+    along = radius**2 * (0.5 * share + 0.4 * (1 - share))
+    caps = 0.4 * radius**2 + half**2 + 0.75 * radius * half
+    across = share * (radius**2 / 4 + half**2 / 3) + (1 - share) * caps
+    return [solid.mass * across, solid.mass * along, solid.mass * across]
+
+
 # ---- the choice
 
 
@@ -445,10 +514,12 @@ def test_chosen_steps_are_hard_different_and_evenly_spread(tmp_path: Path) -> No
         # each second one is the one before it, with its contacts in another order
         order = (3, 1, 0, 2) if number % 2 else (0, 1, 2, 3)
         written(folder / "run-0", number, 1e-3 * (number // 2), order=order)
-    counts = {number: 5 if number < 10 else 100 for number in range(40)}
-    sweeps(folder, counts)
-    found = [state.number for state in rt444_states.candidates("BoxesStack", folder)]
-    assert found == list(range(10, 40, 2))
+    found = [state.number for state in rt444_states.distinct("BoxesStack", folder, 1)]
+    assert found == list(range(0, 40, 2))
+    thinned = [state.number for state in rt444_states.distinct("BoxesStack", folder, 5)]
+    assert thinned == list(range(0, 40, 5))
+    sweeps(folder, {number: 5 if number < 10 else 100 for number in found})
+    assert rt444_states.candidates("BoxesStack", folder) == list(range(10, 40, 2))
     path = rt444_states.choose("BoxesStack", folder, tmp_path / "out", "1", 5)
     states = trajectory.read(path)
     assert np.diff(states.step).tolist() == [6] * 4
@@ -461,12 +532,14 @@ def test_chosen_steps_are_hard_different_and_evenly_spread(tmp_path: Path) -> No
 def test_a_step_whose_w_is_not_the_engines_is_left_out(tmp_path: Path) -> None:
     folder = tmp_path / "BoxesStack"
     path = written(folder / "run-0", 3, 1e-3)
-    sweeps(folder, {3: 100})
-    assert [state.number for state in rt444_states.candidates("BoxesStack", folder)] == [3]
+    rt444_states.judge("BoxesStack", folder, 1, 300)
+    assert list(rt444_states.judged(folder)) == [3]
     with np.load(path) as data:
         values = dict(data)
     np.savez(path, **(values | {"W_data": 1.001 * values["W_data"]}))
-    assert not list(rt444_states.candidates("BoxesStack", folder))
+    rt444_states.sweeps_of(folder).unlink()
+    rt444_states.judge("BoxesStack", folder, 1, 300)
+    assert not rt444_states.judged(folder)
     with pytest.raises(SystemExit, match="0 different steps"):
         rt444_states.choose("BoxesStack", folder, tmp_path / "out", "1", 1)
     assert not list(tmp_path.rglob(f"*{trajectory.SUFFIX}"))
@@ -493,8 +566,52 @@ def test_judgement_goes_on_where_it_was(tmp_path: Path) -> None:
     for number in range(3):
         written(folder / "run-0", number, 1e-3 * number)
     sweeps(folder, {1: 77})
-    rt444_states.judge("BoxesStack", folder, 300)
+    rt444_states.judge("BoxesStack", folder, 1, 300)
     judged = rt444_states.judged(folder)
     assert judged[1] == 77
     assert sorted(judged) == [0, 1, 2]
     assert all(0 < judged[number] <= 300 for number in (0, 2))
+
+
+def test_a_simulation_gets_the_reactions_of_its_steps() -> None:
+    """Siconos asks in bytes; what comes back are reactions of the problem."""
+    position, velocity, contacts = some_states(3)
+    problem: Any = contacts.problem(2, position[2], velocity[2], H, fclib.ProblemInfo()).condense()
+    here, there = Pipe()
+    serving = threading.Thread(target=rt444_states.solves, args=(here,))
+    serving.start()
+    W = sp.csc_array(problem.W)
+    told = io.BytesIO()
+    np.savez(told, data=W.data, indices=W.indices, indptr=W.indptr, q=problem.q, mu=problem.mu)
+    there.send_bytes(told.getvalue())
+    r = np.frombuffer(there.recv_bytes())
+    there.close()
+    serving.join(timeout=10)
+    assert not serving.is_alive()
+    assert fclib.merit(problem, fclib.Solution(r=r, u=W @ r + problem.q)).natural <= 1e-8
+
+
+def test_siconos_goes_on_from_a_step_with_these_reactions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The lowest box rests; its reactions in Siconos' steps are solutions to the tolerance."""
+    if siconos.missing():
+        pytest.skip("needs Siconos")
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    folder = tmp_path / "BoxesStack"
+    written(folder / "run-0", 100, 0.0, first=100)
+    h = _rt444_scenes.SCENES["BoxesStack"].step
+    rt444_states.simulate("BoxesStack", folder, 1, 106 * h)
+    found = rt444_states.files(folder)
+    assert len(found) >= 4
+    assert max(found) == 105
+    for number in range(103, 106):
+        told = _siconos.told(found[number])
+        with np.load(found[number]) as data:
+            r, mu = data["r"], data["mu"]
+        problem = fclib.LocalProblem(spacedim=3, W=told.W, q=told.q, mu=mu)
+        result = fclib.Solution(r=r, u=told.W @ r + told.q)
+        assert fclib.merit(problem, result).natural <= 1e-8
+        # the box weighs on the ground, and nothing else does yet
+        weight = rt444_states.GRAVITY * h
+        assert np.reshape(r, (-1, 3))[:, 0].sum() == pytest.approx(weight, rel=1e-6)

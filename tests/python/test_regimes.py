@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fclib
+import fclib.simulate
 from fclib import collections
 from fclib.collections import published
 from fclib.scenes.local_problems import ChuteLocalProblems
@@ -123,3 +124,36 @@ def test_a_regime_is_filled_up_to_the_published_number(monkeypatch: pytest.Monke
     assert {row.number for row in few} < {row.number for row in many}
     inside = {row.contacts for row in many}
     assert (min(inside), max(inside)) == (9, 28)
+
+
+def test_every_regime_stands_beside_its_published_set() -> None:
+    ours = {row["set"]: row["ours"] for row in PUBLISHED}
+    for name, regime in regimes.REGIMES.items():
+        assert ours[regime.published] == f"{regime.collection}/{name}"
+        family: Any = fclib.scenes.get(regime.scene or name)
+        family(**regime.parameters)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Spheres", 1.0), ("Spheres1mm", 1e-3)])
+def test_the_column_of_spheres_begins_as_the_librarys(name: str, unit: float) -> None:
+    """10 x 10 x 20 of them, 2 apart, the lowest 5 above the ground, each a little beside it."""
+    regime = regimes.REGIMES[name]
+    family: Any = fclib.scenes.get(regime.scene)
+    model: Any = fclib.simulate.model_of(family(**regime.parameters).scene(3))
+    places = model.position.reshape(-1, 7)[:, :3] / unit
+    grid = np.array([(2 * i - 9, 2 * j - 9, 2 * k + 5) for k in range(20) for i in range(10)
+                     for j in range(10)])  # fmt: skip
+    assert np.abs(places - grid).max() <= 0.05 + 1e-9
+    assert np.abs(places - grid).max() > 0.045
+    mass = model.model.body_mass[1:]
+    expected = 1.0 if name == "Spheres" else 1000 * 4 / 3 * np.pi * 0.9e-3**3
+    np.testing.assert_allclose(mass[mass > 0], expected, rtol=1e-3)
+    assert fclib.scenes.get(regime.scene)(**regime.parameters).scene(0).all_bodies
+
+
+def test_a_sphere_stays_in_its_place() -> None:
+    family: Any = fclib.scenes.get("SpheresInABox")
+    with pytest.raises(ValueError, match=r"offset must be at most gap / 2 = 0.05, not 0.06"):
+        family(offset=0.06)
+    with pytest.raises(ValueError, match="width"):
+        family(across=6)

@@ -23,7 +23,6 @@ from fclib.collections import catalog, set_index
 from fclib.collections.plan import Plan
 from fclib.scenes.local_problems import LocalProblems
 from workshop.sets import choose
-from workshop.sets.__main__ import app as lists
 
 TINY = set_index.DATA / "tiny"
 FILES = sorted(TINY.glob("*/*.hdf5"))
@@ -182,53 +181,14 @@ def test_tiny_list_is_what_the_command_writes(tmp_path: Path) -> None:
     assert path.read_text() == (set_index.DATA / "tiny.json").read_text()
 
 
-# ---- hard
+# ---- lists
 
 
-def run_of(row: dict[str, Any], solver: str, solved: bool, **more: Any) -> dict[str, Any]:
-    run = {"hash": row["digest"], "solver": solver, "solved": int(solved), "tol": 1e-8}
-    return run | {"status": "converged", "iterations": 10} | more
-
-
-def test_hard_is_what_most_solvers_fail_on() -> None:
-    rows = {row["family"]: row for row in collections.read_catalog(set_index.DATA).to_pylist()}
-    capsules, kaplas, wall = rows["Capsules"], rows["KaplasTower"], rows["Wall"]
-    runs = [run_of(kaplas, name, name == "a") for name in "abc"]
-    runs += [run_of(capsules, name, name != "a") for name in "abc"]
-    runs += [run_of(wall, "a", False), run_of(wall, "b", True), run_of(wall, "b", False, repeat=1)]
-    # of the solvers that take it, half
-    runs += [run_of(wall, "c", False, status="unsuitable")]
-    # what does not count: another tolerance, no problem of these, one that not all were run on
-    runs += [run_of(capsules, name, False, tol=1e-4) for name in "abc"]
-    runs += [run_of(capsules, "d", False, hash=""), run_of(rows["FourBar"], "a", False)]
-    chosen = choose.hard(runs, set_index.DATA)
-    assert [choice.family for choice in chosen] == ["KaplasTower", "Wall"]
-    listed = {choice.family: choice for choice in set_index.choices("tiny")}
-    # the files say the parameters of their scenes
-    assert chosen == [listed["KaplasTower"], listed["Wall"]]
-    assert [choice.family for choice in choose.hard(runs, set_index.DATA, share=0.6)] == [
-        "KaplasTower"
-    ]
-    with pytest.raises(ValueError, match="no problem that all solvers were run on at 1e-12"):
-        choose.hard(runs, set_index.DATA, tol=1e-12)
-
-
-def test_hard_is_chosen_from_a_store_and_built(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store, data = tmp_path / "runs.sqlite", tmp_path / "data"
+def test_a_list_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = tmp_path / "data"
     data.mkdir()
-    # the first solves another law
-    solvers = ("--solver", "associated", "--solver", "auto")
-    done = invoke(
-        *("bench", "--problems", TINY / "Wall", *solvers),
-        *("--tol", 1e-8, "--time-limit", 5, "--store", store),
-    )
-    assert done.exit_code in (0, 1), done.output
-    args = ["hard", store, "--in", set_index.DATA, "--out", data / "hard.json"]
-    assert CliRunner().invoke(lists, [str(word) for word in args]).exit_code == 0
-    rule = json.loads((data / "hard.json").read_text())["rule"]
-    assert rule["time_limits"] == [5.0]
+    wall = next(c for c in set_index.choices("tiny") if c.family == "Wall")
+    choose.write_list(data / "hard.json", [wall], {})
     monkeypatch.setattr(set_index, "DATA", data)
     set_index.choices.cache_clear()
     try:
@@ -341,6 +301,10 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "simulators",
         "decks",
         "rr9118",
+        "quasistatic",
+        "laws",
+        "assembly",
+        "flows",
     }
     families = {tuple(origin.split("/")[:2]) for origin in origins}
     assert {name for name, _ in families} >= {"ladder", "rt444", *set_index.EXTENDED} - later

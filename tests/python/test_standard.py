@@ -1,12 +1,9 @@
 """The set `standard`: how it is chosen, and how its problems stand."""
 
 import json
-from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -19,8 +16,7 @@ pytest.importorskip("pyarrow")
 
 from fclib import collections
 from fclib.collections import published, ratings, set_index, trajectory
-from workshop.sets import candidates, choose, features, select
-from workshop.sets.__main__ import app as lists
+from workshop.sets import features
 
 load: Any = fclib.load
 there = pytest.mark.skipif(
@@ -32,24 +28,7 @@ def invoke(*arguments: object) -> Any:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-def listed(*arguments: object) -> Any:
-    """A command of workshop/sets."""
-    return CliRunner().invoke(lists, [str(argument) for argument in arguments])
-
-
-# ---- candidates
-
-
-def test_nearly_equal_problems_are_thinned() -> None:
-    problem = load("tiny/Wall/0003", "local")
-    near = problem.replace(q=problem.q * (1 + 0.9e-3), W=problem.W * (1 - 0.9e-3))
-    others = [
-        problem.replace(q=problem.q * (1 + 1.1e-3)),
-        problem.replace(W=problem.W * (1 + 1.1e-3)),
-        problem.replace(mu=problem.mu * 1.0001),
-    ]
-    made = [(k, features.Matrix(p)) for k, p in enumerate([problem, near, *others])]
-    assert [number for number, _ in features.thinned(made)] == [0, 2, 3, 4]
+# ---- features
 
 
 def test_features_are_what_their_names_say() -> None:
@@ -69,59 +48,6 @@ def test_features_are_what_their_names_say() -> None:
         features.Matrix(rolling), set_index.plan_of("tiny/RollingDiscs").scene
     )
     assert (found["rolling"], found["planar"], found["spacedim"]) == (1, 1, 3)
-    made = features.behaviour(features.Matrix(rolling))
-    # does not take rolling friction
-    assert made["nsip_error"] is None
-    assert made["nsn-ac_error"] is not None
-    assert (made["nsgs_iterations"] or 0) <= features.SOLVERS["nsgs"]
-
-
-def rows_of(families: dict[str, int]) -> list[dict[str, Any]]:
-    """Rows of a table, of all sizes."""
-    random = np.random.default_rng(1)
-    return [
-        {"family": name, "number": k, "nc": 10 ** random.uniform(0, 3.5), "mu": random.normal()}
-        for name, count in families.items()
-        for k in range(count)
-    ]
-
-
-def test_choice_is_bounded_and_keeps_what_it_must() -> None:
-    rows = rows_of({"A": 40, "B": 2, "C": 30, "D": 30})
-    rule = select.Rule(problems=20, clusters=12, per_cluster=3, least=3, most=7)
-    chosen = select.choose(rows, rule)
-    assert len(chosen) == 20
-    names = [rows[k]["family"] for k in chosen]
-    counts = {name: names.count(name) for name in "ABCD"}
-    assert counts["B"] == 2  # it has no more
-    assert all(3 <= counts[name] <= 7 for name in "ACD")
-    cluster = select.clusters(features.points(rows), rule.clusters)
-    assert np.bincount(cluster[chosen]).max() <= 3
-    # every cluster is met, since there are fewer than problems
-    assert set(cluster[chosen]) == set(cluster)
-    assert select.choose(rows, rule) == chosen
-    # what is kept stays, and others come from other families
-    kept = [(rows[k]["family"], rows[k]["number"]) for k in chosen if rows[k]["family"] != "D"]
-    more = select.Rule(problems=len(kept) + 2, clusters=12, per_cluster=3, least=3, most=7)
-    again = [(rows[k]["family"], rows[k]["number"]) for k in select.choose(rows, more, kept)]
-    assert set(kept) < set(again)
-    assert [name for name, _ in again if name != "D"] == [name for name, _ in kept]
-    with pytest.raises(ValueError, match="no choice of 60 problems"):
-        select.choose(rows, select.Rule(problems=60, clusters=12, per_cluster=3, most=7))
-
-
-@there
-def test_standard_is_what_its_table_gives() -> None:
-    rule = json.loads((set_index.DATA / "standard.json").read_text())["rule"]
-    listed = set_index.choices("standard")
-    assert len(listed) == rule["problems"]
-    rows = select.read_table(ratings.folder() / "candidates.csv")
-    kept = set(map(tuple, rule["kept"]))
-    chosen = [rows[k] for k in select.choose(rows, select.Rule(rule["problems"]), kept)]
-    assert [(row["family"], row["number"], row["digest"]) for row in chosen] == [
-        (choice.family, choice.number, choice.digest) for choice in listed
-    ]
-    assert {choice.family for choice in listed} == {row["family"] for row in rows}
 
 
 @there
@@ -137,17 +63,6 @@ def test_standard_has_the_states_of_its_list() -> None:
             assert published.digests(folder, stored[-1]) == own
         else:
             assert folder.partition("/")[2] in scenes.assemblies()
-
-
-def test_candidates_are_spread_and_named_by_their_scene(tmp_path: Path) -> None:
-    pytest.importorskip("mujoco")
-    assert candidates.spread(10, 4) == (0, 3, 6, 9)
-    assert candidates.spread(3, 9) == (0, 1, 2)
-    (found,) = candidates.candidates(tmp_path, ["LocalProblems"], kept=5)
-    assert len(list(found.problems())) == 5
-    plan = set_index.plan_of("planar/PlanarBlocks", chosen=(0, 1), problems=None, steps=20)
-    other = set_index.plan_of("planar/PlanarBlocks", seed=1, chosen=(0, 1), problems=None, steps=20)
-    assert candidates.key(plan) == candidates.key(plan) != candidates.key(other)
 
 
 # ---- how problems stand
@@ -415,23 +330,6 @@ def test_a_version_of_a_set_has_families_that_did_not_change() -> None:
 
 
 @there
-def test_hard_is_what_runs_class_so() -> None:
-    sets = json.loads((set_index.DATA / "hard.json").read_text())["rule"]["grown"]["sets"]
-    rated = {row.digest: row for name in ["standard", *sets] for row in ratings.ratings_of(name)[0]}
-    own = [rated[choice.digest] for choice in set_index.choices("hard")]
-    assert {row.rating for row in own} <= {"hard", "open"}
-    # version 8 was of standard alone, and is in what came later
-    before = [rated[choice.digest] for choice in set_index.listed("hard", "8")]
-    assert {row.id.partition("/")[0] for row in before} == {"standard"}
-    assert len(before) == 57
-    later = [choice for choice in set_index.choices("hard") if choice.since == "9"]
-    assert len(later) + len(before) == len(own)
-    counts = Counter(rated[choice.digest].id.rpartition("/")[0] for choice in later)
-    assert max(counts.values()) <= 5
-    assert {folder.partition("/")[0] for folder in counts} <= set(sets)
-
-
-@there
 def test_version_8_of_hard_is_whole() -> None:
     """Families that did not change since have their older states."""
     found = {
@@ -444,77 +342,3 @@ def test_version_8_of_hard_is_whole() -> None:
         if number in plan.numbers()
     }
     assert found == {(c.family, c.number): c.digest for c in set_index.listed("hard", "8")}
-
-
-@there
-def test_list_grows_by_what_runs_class_hard_or_open(
-    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("mujoco")
-    members = ratings.members("rt444")
-
-    def ran(problem: str, solved: str) -> list[ratings.Run]:
-        digest = members[f"rt444/{problem}"][: ratings.DIGITS]
-        one = run("Wall/0003", "a", 1e-9)
-        return [
-            replace(one, problem=problem, digest=digest, solver=name)
-            if name in solved
-            else replace(
-                one, problem=problem, digest=digest, solver=name, error=1e-3, status="stalled"
-            )
-            for name in "abc"
-        ]
-
-    # of three hard ones the two that fewest solved, the first of equals; not the easy one
-    rows = [*ran("Chain/0010", "a"), *ran("Chain/0020", "b"), *ran("Chain/0030", "")]
-    ratings.write([*rows, *ran("Capsules/0150", "a"), *ran("BoxesStack/0100", "abc")])
-    tiny = {choice.family: choice for choice in set_index.choices("tiny")}
-    before, after, states = tmp_path / "old.json", tmp_path / "data/hard.json", tmp_path / "own"
-    after.parent.mkdir()
-    choose.write_list(before, [tiny["Capsules"], tiny["Wall"]], {"share": 0.5})
-    more = ("--set", "rt444", "--per-family", 2, "--version", "9")
-    place = states / published.FOLDER
-    done = listed("hard", "--keep", before, *more, "--out", after, "--states", place)
-    assert done.exit_code == 0, done.output
-    made = json.loads(after.read_text())
-    assert made["rule"] == {"share": 0.5, "grown": {"sets": ["rt444"], "per_family": 2}}
-    # another family of that name has a name of its own
-    kept = ["Capsules/300 8", "Wall/3 8"]
-    names = [f"{row['family']}/{row['number']} {row['since']}" for row in made["problems"]]
-    assert names == [kept[0], "Capsules_rt444/150 9", "Chain/10 9", "Chain/30 9", kept[1]]
-    # from what it made it makes the same
-    again = tmp_path / "again.json"
-    assert listed("hard", "--keep", after, *more, "--out", again).exit_code == 0
-    assert again.read_text() == after.read_text()
-
-    monkeypatch.setattr(set_index, "DATA", after.parent)
-    monkeypatch.setattr(published, "IN_PLACE", states)
-    set_index.choices.cache_clear()
-    try:
-        assert set_index.folders(["hard"], "8") == ["hard/Capsules", "hard/Wall"]
-        assert set_index.plan_of("hard/Wall", version="8").numbers().tolist() == [3]
-        with pytest.raises(collections.VersionError, match="version 8 is not stored here"):
-            set_index.plan_of("hard/Chain", version="8")
-        out = tmp_path / "built"
-        done = invoke(
-            *("collection", "build", "hard/Chain", "hard/Capsules_rt444", "hard/Wall"),
-            *("--form", "global", "--no-references", "--no-pictures", "--out", out),
-        )
-        assert done.exit_code == 0, done.output
-        built = {row["id"]: row for row in collections.read_catalog(out).to_pylist()}
-        found = built["hard/Capsules_rt444/0150"]
-        assert found["digest"] == members["rt444/Capsules/0150"]
-        assert found["license"] is not None
-        assert {set_index.origin_of(row) for row in built.values()} == {"published"}
-        assert all(verdict.ok for verdict in collections.verify(out))
-        problem = load("hard/Capsules_rt444/0150", folder=out)
-        assert fclib.digest(problem) == found["digest"]
-        shown = invoke("collection", "show", "hard/Capsules_rt444")
-        assert scenes.get("Capsules").title in shown.output
-        # what is neither way of choosing is refused, and a list of no version
-        assert listed("hard", "--out", again).exit_code == 2
-        args = ("hard", "--keep", before, *more, "--out", again)
-        assert listed(*args, "--version", "1").exit_code == 2
-        assert listed(*args, before).exit_code == 2
-    finally:
-        set_index.choices.cache_clear()

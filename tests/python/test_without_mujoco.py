@@ -50,7 +50,7 @@ def test_it_is_an_extra() -> None:
         "simulate scene.xml --out made",
         "demo --out made",
         "collection build tiny --out made",
-        "collection build rt444/BoxesStack --count 1 --out made",
+        "collection build rt444/Chain --count 1 --out made",
         "collection simulate rt444/BoxesStack --count 2 --out made",
         "bench quick --store made.sqlite",
     ],

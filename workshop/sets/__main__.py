@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections import Counter
+import subprocess
 from pathlib import Path
 from typing import Annotated
 
@@ -11,158 +10,192 @@ import typer
 
 import fclib
 from fclib import collections
-from fclib.bench import Store
-from fclib.cli._output import fail, out, usage_error
+from fclib.cli._output import Rows, fail, out
 from fclib.cli._progress import many_bars
-from fclib.collections import set_index
-from workshop.sets import choose, select
-from workshop.sets.candidates import candidates
+from fclib.collections import published, ratings
+from workshop.sets import candidates, choose, difficulty, select, sequences
+from workshop.tables import _results
 
 app = typer.Typer(
-    help="Make the lists of chosen problems: the sets standard, hard and tiny, the family"
-    " LocalProblems.",
+    help="Make the lists of chosen problems: the sets standard, hard, open, sequences and tiny,"
+    " the family LocalProblems.",
     no_args_is_help=True,
 )
 
+Folder = Annotated[Path, typer.Argument(help="Folder of the candidates and their runs.")]
 List = Annotated[Path, typer.Option("--out", help="The list that is written, JSON.")]
+Lists = Annotated[Path, typer.Option("--out", help="Folder that the lists are written into.")]
 States = Annotated[
-    Path | None, typer.Option(help="Folder that the chosen states are written into.")
+    Path | None,
+    typer.Option(help="Folder that the chosen states are written into; else that of the package."),
 ]
-Version = Annotated[str, typer.Option(help="Version of the states that are written.")]
+Version = Annotated[str, typer.Option(help="Version of the lists: a number, higher than before.")]
+Estimate = Annotated[bool, typer.Option("--estimate", help="Say the CPU it needs, and end.")]
 PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
+# what may go wrong with data, in words for the user
+FAULTS = (ImportError, OSError, ValueError, FloatingPointError, MemoryError, fclib.Error)
 
 
-@app.command("hard")
-def choose_hard(
-    target: List,
-    stores: Annotated[list[Path] | None, typer.Argument(help="Stores of fclib bench.")] = None,
-    folder: Annotated[
-        Path | None, typer.Option("--in", help="The collection that they are of.")
+@app.command("candidates")
+def find_candidates(
+    folder: Folder,
+    names: Annotated[
+        list[str] | None, typer.Option("--family", help="Only these SET/FAMILY.")
     ] = None,
-    kept: Annotated[
-        Path | None,
-        typer.Option("--keep", help="A list that stays; those of --set come to it."),
+    estimate: Estimate = False,
+    results: Annotated[
+        str | None, typer.Option(help="Store the CPU of each family as docs/results/NAME.csv.")
     ] = None,
-    sets: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="A set: what the stored runs class hard or open in it."),
-    ] = None,
-    tol: Annotated[float, typer.Option(help="Tolerance of the runs that count.")] = 1e-8,
-    share: Annotated[
-        float, typer.Option(help="Share of the solvers that must have failed.", min=0.0, max=1.0)
-    ] = 0.5,
-    per_family: PerFamily = 5,
-    states: States = None,
-    version: Version = "1",
 ) -> None:
-    """Choose the problems that most solvers fail on, from campaigns.
+    """Describe candidates of all families, and write a file for each that stays.
 
-    From stores over a built collection; or a list with the problems of further sets that are hard
-    or open by the runs that `fclib collection status` tells of.
+    Families without stored states are simulated. It goes on after a kill. Families that changed, or
+    are new, are described anew.
     """
-    if kept is not None and sets and not stores:
-        if not version.isdecimal() or int(version) < 2:
-            usage_error(ValueError("--version: give that of the list that is made, 2 or more"))
-        grow(kept, sets, target, per_family, states, version)
+    own = names or candidates.folders()
+    if lost := sorted(set(own) - set(candidates.folders())):
+        fail(f"{', '.join(lost)}: there is no such SET/FAMILY from which candidates come")
+    out.print(difficulty.estimate(folder, own), highlight=False)
+    if estimate:
         return
-    if not stores or folder is None or kept is not None or sets:
-        usage_error(ValueError("give stores and --in, or --keep and --set"))
-    runs = []
     try:
-        for path in stores:
-            with Store(path, create=False) as store:
-                runs += store.results(start="cold")
-        chosen = choose.hard(runs, folder, tol=tol, share=share, per_family=per_family)
-    except (fclib.Error, collections.CatalogError, ImportError, ValueError) as error:
-        fail(str(error))
-    solvers = sorted({run["solver"] for run in runs if run["tol"] == tol})
-    limits = sorted({run["time_limit"] for run in runs if run["tol"] == tol})
-    rule = {"tol": tol, "share": share, "per_family": per_family}
-    choose.write_list(target, chosen, rule | {"solvers": solvers, "time_limits": limits})
-    if states is not None:
-        try:
-            sources = select.sources_of(folder, {choice.family for choice in chosen})
-            select.publish(sources, chosen, "hard", version, states)
-        except (OSError, ValueError, KeyError) as error:
-            fail(str(error))
-    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
-
-
-def grow(
-    kept: Path, sets: list[str], target: Path, per_family: int, states: Path | None, version: str
-) -> None:
-    """Write a list that has the hard and open problems of further sets too."""
-    try:
-        rule = json.loads(kept.read_text(encoding="utf-8"))["rule"]
-        chosen, sources = choose.grown(set_index.Choice.read(kept), sets, version, per_family)
-        rule["grown"] = {"sets": sets, "per_family": per_family}
-        choose.write_list(target, chosen, rule)
-        if states is not None:
-            select.publish(sources, chosen, "hard", version, states)
-    except KeyError as error:
-        fail(str(error.args[0]))
-    except (ImportError, OSError, ValueError) as error:
-        fail(str(error))
-    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
-
-
-@app.command("standard")
-def choose_standard(
-    folder: Annotated[
-        Path, typer.Option("--candidates", help="Folder of candidates; simulated what it lacks.")
-    ],
-    target: List,
-    table: Annotated[Path, typer.Option(help="Features of all candidates, CSV.")],
-    states: States = None,
-    version: Version = "1",
-    kept: Annotated[
-        Path | None,
-        typer.Option("--keep", help="A list that stays; problems of other families come to it."),
-    ] = None,
-    problems: Annotated[int, typer.Option(help="That are chosen.", min=1)] = select.Rule.problems,
-    clusters: Annotated[
-        int, typer.Option(help="Number of clusters of like problems.", min=1)
-    ] = select.Rule.clusters,
-) -> None:
-    """Choose few problems of each kind, from all families.
-
-    It goes on after a kill. Families that changed, or are new, are simulated. Features of other
-    families are read from the table, if there is one. A problem of a list that is kept stays as it
-    is, even if its family has changed.
-    """
-    rule = select.Rule(problems=problems, clusters=clusters)
-    held = set_index.Choice.read(kept) if kept is not None else ()
-    try:
-        rows = select.read_table(table) if table.is_file() else []
-        sources = {}
-        names = set(collections.families()) - {choice.family for choice in held}
-        if not names:
-            fail(f"{kept}: has problems of all families, there is nothing to add")
         with many_bars() as bars:
-            for found in candidates(folder, sorted(names), progress=bars):
-                name = found.plan.scene.name
-                sources[name] = found
-                own = [row for row in rows if row["family"] == name]
-                if not select.describes(own, found):
-                    rows = [row for row in rows if row["family"] != name]
-                    rows += select.described(found, bars)
-                    select.write_table(table, rows)
-        # by the stored digits, so that everybody with the table gets the same choice
-        rows = select.read_table(table)
-        fixed = sorted({(choice.family, choice.number) for choice in held})
-        chosen = [rows[k] for k in select.choose(rows, rule, fixed)]
-        new = [row for row in chosen if row["family"] in names]
-        choices = [*held, *select.choices_of(sources, new)]
-        choices.sort(key=lambda choice: (choice.family, choice.number))
-        choose.write_list(target, choices, rule.record() | {"kept": fixed})
-        if states is not None:
-            select.publish(sources, choices, "standard", version, states)
-    except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
+            rows = difficulty.describe(folder, own, bars)
+        count = difficulty.write_problems(folder, rows)
+    except FAULTS as error:
         fail(str(error))
-    counts = Counter(choice.family for choice in choices)
-    for name, count in counts.items():
-        out.print(f"{name} {count}", highlight=False)
-    out.print(f"{len(choices)} problems of {len(rows)} candidates:  {target}")
+    out.print(f"{count} of {len(rows)} candidates stay:  {folder / 'problems'}", highlight=False)
+    if results:
+        costs = difficulty.known_costs(folder)
+        table = [{"family": name, "CPU [s]": f"{costs[name]:.1f}"} for name in sorted(own)]
+        _results.store(
+            results,
+            [*table, {"family": "all", "CPU [s]": f"{sum(costs[name] for name in own):.0f}"}],
+            title="What the candidates of the sets cost",
+            note="Simulation of families without stored states, and features.",
+        )
+
+
+@app.command()
+def measure(
+    folder: Folder,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", help="Runs at once.", min=1)] = 1,
+    estimate: Estimate = False,
+) -> None:
+    """Measure what solvers do on the candidates: campaigns difficulty and difficulty-long.
+
+    It goes on after a kill.
+    """
+    rule = select.Rule()
+    files = len(list((folder / "problems").glob("*/*.hdf5")))
+    if not files:
+        fail(f"{folder}: has no problems; python -m workshop.sets candidates {folder} makes them")
+    out.print(difficulty.needed(folder, select.SHORT, files), highlight=False)
+    if estimate:
+        runs = len(list((folder / "difficult").glob("*/*.hdf5"))) or files
+        out.print(difficulty.needed(folder, select.LONG, runs), highlight=False)
+        return
+    try:
+        difficulty.run(folder, select.SHORT, jobs)
+        count = difficulty.link_difficult(folder, rule)
+        out.print(difficulty.needed(folder, select.LONG, count), highlight=False)
+        if count:
+            difficulty.run(folder, select.LONG, jobs)
+    except (subprocess.CalledProcessError, *FAULTS) as error:
+        fail(str(error))
+
+
+@app.command("choose")
+def choose_sets(
+    folder: Folder,
+    target: Lists,
+    version: Version,
+    states: States = None,
+    results: Annotated[
+        str | None, typer.Option(help="Store the counts as docs/results/NAME.csv.")
+    ] = None,
+) -> None:
+    """Choose the sets standard, hard and open, and say of each candidate why.
+
+    The lists, the states of their problems and the table choice-VERSION.csv are written. The lists
+    follow from that table alone. Nothing that is there is rewritten: other problems need a further
+    version.
+    """
+    rule = select.Rule()
+    target.mkdir(parents=True, exist_ok=True)
+    package = states.parent if states is not None else published.IN_PLACE
+    table = package / ratings.FOLDER / f"choice-{version}.csv"
+    try:
+        measured = difficulty.measured(folder)
+        select.write_table(folder / "measured.csv", measured)
+        # by the stored digits, so that everybody with the table gets the same choice
+        rows = select.read_table(folder / "measured.csv")
+        chosen = select.choose(rows, rule)
+        told = [
+            {**row, "set": name, "why": why}
+            for row, name, why in zip(rows, chosen.set, chosen.why, strict=True)
+        ]
+        if table.is_file() and select.read_table(table) != told:
+            fail(f"{table}: is another choice; a newer one is a further version (--version)")
+        taken = [rows[k] for name in select.SETS for k in chosen.of(name)]
+        sources = {
+            own: candidates.candidates_of(own, folder)
+            for own in dict.fromkeys(map(select.folder_of, taken))
+        }
+        choose.archive(target, select.SETS, version)
+        for name in select.SETS:
+            choices = select.choices_of(sources, [rows[k] for k in chosen.of(name)])
+            choose.write_list(
+                target / f"{name}.json", choices, rule.record() | {"version": version}
+            )
+            select.publish(sources, choices, name, version, states or package / published.FOLDER)
+        select.write_table(table, told)
+    except FAULTS as error:
+        fail(str(error))
+    counts = select.counts_of(chosen)
+    out.print(Rows(counts))
+    for line in chosen.lacking:
+        out.print(f"lacking: {line}", highlight=False)
+    out.print(f"{table}\nSay version {version} of these sets in fclib.collections.set_index.SETS")
+    if results:
+        _results.store(
+            results,
+            counts,
+            title="The candidates of the sets, and what became of them",
+            note="; ".join(chosen.lacking) or "All bounds of the rule hold.",
+        )
+
+
+@app.command("sequences")
+def choose_sequences(
+    folder: Folder, target: Lists, version: Version, states: States = None
+) -> None:
+    """Choose the simulations of the set sequences; those without stored states are simulated."""
+    rule = sequences.Rule()
+    target.mkdir(parents=True, exist_ok=True)
+    try:
+        chosen = sequences.choose(select.read_table(folder / difficulty.TABLE), rule)
+        choices = []
+        with many_bars() as bars:
+            for own, numbers in chosen:
+                found = sequences.states_of(own, numbers, folder / "sequences", bars)
+                mine = sequences.choices_of(found)
+                choices += mine
+                select.publish(
+                    {own: found},
+                    mine,
+                    "sequences",
+                    version,
+                    states or published.IN_PLACE / published.FOLDER,
+                )
+        choose.archive(target, ["sequences"], version)
+        choose.write_list(target / "sequences.json", choices, rule.record() | {"version": version})
+    except FAULTS as error:
+        fail(str(error))
+    for own, numbers in chosen:
+        out.print(f"{own} {numbers[0]} to {numbers[-1]}", highlight=False)
+    if len(chosen) < rule.count:
+        out.print(f"lacking: {rule.count - len(chosen)} of {rule.count} simulations")
 
 
 @app.command("local")

@@ -1,59 +1,64 @@
-"""A script of Siconos: a pile of boxes, in m, kg and s, by the integrator that keeps M and H.
+"""A script of Siconos: free boxes on a plane, in m, kg and s, by the integrator that keeps M and H.
 
-    /usr/bin/python3 workshop/sets/_siconos_boxes.py STEPS [LEAN]
+    /usr/bin/python3 workshop/sets/_siconos_boxes.py STEPS STEP SCALE BOXES
 
-recorded_steps.py and record_simulators.py record its steps. LEAN is how far a box is further out
-than the one below it, in edges.
+recorded_steps.py, record_simulators.py and judged_engines.py record its steps. STEP is the time
+step; SCALE is Bullet's, whose margins are made for edges of 1 m. BOXES is a list in JSON of half
+edges, mass, place and velocity: of the centre, or with the angular one behind it.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 from pathlib import Path
 
 import siconos.io.mechanics_run as mechanics_run
 import siconos.kernel as kernel
+import siconos.mechanics.collision.bullet as bullet
 import siconos.numerics as numerics
 from siconos.mechanics.collision.tools import Contactor
 
-STEP = 0.005  # [s]
-BOXES = 6
-EDGE = 1.0  # [m] Bullet's margins are made for such sizes
+MU = 0.5
 TOLERANCE = 1e-8
 MOST_ITERATIONS = 10_000
 
 
 def main() -> None:
-    steps = int(sys.argv[1])
-    lean = float(sys.argv[2]) if len(sys.argv) > 2 else 0.1
+    steps, step = int(sys.argv[1]), float(sys.argv[2])
+    boxes = json.loads(sys.argv[4])
     options = kernel.solver_options_create(numerics.SICONOS_GLOBAL_FRICTION_3D_NSGS_WR)
     options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = MOST_ITERATIONS
     options.dparam[numerics.SICONOS_DPARAM_TOL] = TOLERANCE
+    collision = bullet.SiconosBulletOptions()
+    collision.worldScale = float(sys.argv[3])
     with tempfile.TemporaryDirectory() as folder:
         file = str(Path(folder) / "scene.hdf5")
         with mechanics_run.MechanicsHdf5Runner(mode="w", io_filename=file) as io:
             io.add_primitive_shape("Ground", "Box", (100, 100, 1))
             io.add_object("ground", [Contactor("Ground")], translation=[0, 0, -0.5])
-            io.add_primitive_shape("Box", "Box", (EDGE, EDGE, EDGE))
-            for i in range(BOXES):
-                mass = 1.0 + i
+            for i, box in enumerate(boxes):
+                edges = [2 * half for half in box["half"]]
+                squares = [edge**2 for edge in edges]
+                io.add_primitive_shape(f"Box{i}", "Box", edges)
                 io.add_object(
                     f"box{i}",
-                    [Contactor("Box")],
-                    translation=[lean * EDGE * i, 0, (0.52 + 1.05 * i) * EDGE],
-                    velocity=[0, 0, 0, 0.1, 0.2, 0.3],
-                    mass=mass,
-                    inertia=[mass * EDGE**2 / 6] * 3,
+                    [Contactor(f"Box{i}")],
+                    translation=box["place"],
+                    velocity=[*box["velocity"], 0, 0, 0][:6],
+                    mass=box["mass"],
+                    inertia=[box["mass"] / 12 * (sum(squares) - own) for own in squares],
                 )
-            io.add_Newton_impact_friction_nsl("contact", mu=0.5, e=0.0)
+            io.add_Newton_impact_friction_nsl("contact", mu=MU, e=0.0)
         with mechanics_run.MechanicsHdf5Runner(mode="r+", io_filename=file) as io:
             io.run(
-                T=steps * STEP,
-                h=STEP,
+                T=steps * step,
+                h=step,
                 theta=0.50001,
                 Newton_max_iter=1,
                 osi=kernel.MoreauJeanGOSI,
+                bullet_options=collision,
                 solver_options=options,
                 verbose=False,
                 verbose_progress=False,

@@ -4,7 +4,7 @@
 
 Each problem that both hold is compared by its files: whether the digests are equal, whether those
 of the structure are (sizes, and where the matrices have entries), and of each matrix and vector the
-largest difference of two entries over the largest entry. Exit status 1 where a structure differs,
+largest difference of two entries over the largest entry. Exit status 1 if a structure differs,
 a difference is above --bound, or a problem is in one folder alone. `scripts/compare_on.sh` makes
 the other build on another Debian.
 """

@@ -1,7 +1,5 @@
 """Lists of chosen problems, by rules that anyone can repeat.
 
-hard    from stores of campaigns over a built collection: problems that most solvers fail on. A list
-        grows by problems of other sets that the stored runs class as hard or open
 local   from a built collection: the contacts that one-contact solvers find hardest
 tiny    one problem of each kind, from the list below
 """
@@ -12,19 +10,17 @@ import json
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib._origin import origin_of
-from fclib.collections import catalog, ratings, set_index, trajectory
+from fclib.collections import catalog, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
 from fclib.collections.set_index import Choice
-from workshop.sets.candidates import Candidates
 
 Progress = Callable[[str, int, int], None]
 
@@ -51,6 +47,20 @@ def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
     catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
+
+
+def archive(folder: Path, names: Iterable[str], version: str) -> None:
+    """Keep the present lists as those of their version, if they are of another one."""
+    for name in names:
+        path = folder / f"{name}.json"
+        if not path.is_file():
+            continue
+        own = json.loads(path.read_text(encoding="utf-8"))["rule"].get("version")
+        own = own or set_index.version(name)
+        if own != version:
+            target = folder / set_index.OLDER / f"{name}-{own}.json"
+            target.parent.mkdir(exist_ok=True)
+            path.replace(target)
 
 
 # ---- tiny
@@ -82,140 +92,6 @@ def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int
         raise ValueError(f"{family}: has no problem {number}")
     step = int(states.step[0])
     return Choice(family, dict(scene.parameters), seed, number, step, states.digest[0])
-
-
-# ---- hard
-
-
-def hard(
-    runs: Sequence[Mapping[str, Any]],
-    folder: Path,
-    *,
-    tol: float = 1e-8,
-    share: float = 0.5,
-    per_family: int = 5,
-) -> list[Choice]:
-    """The problems that most solvers fail on.
-
-    Only problems count that all solvers of the runs were tried on. Such a problem is hard if at
-    least `share` of the solvers that take it did not solve it. From each family the hardest are
-    taken: first those that most solvers failed on, then those whose fastest solver took most
-    iterations, then the first by name.
-
-    Args:
-        runs: rows of the view `results` of stores, from campaigns over the folder's global files.
-        folder: the collection; its files say what their problems are made from.
-        tol: the tolerance of the runs that count.
-        share: share of the solvers that must have failed.
-        per_family: largest number of problems of a family.
-
-    Raises:
-        CatalogError: the folder has no catalogue.
-        ValueError: no problem of the catalogue has runs of all solvers at this tolerance.
-    """
-    rows = {row["digest"]: row for row in catalog.read_catalog(folder).to_pylist()}
-    solved: dict[str, dict[str, bool]] = defaultdict(dict)
-    effort: dict[str, list[float]] = defaultdict(list)
-    tried: dict[str, set[str]] = defaultdict(set)
-    for run in runs:
-        if run["tol"] != tol or run["hash"] not in rows:
-            continue
-        tried[run["hash"]].add(run["solver"])
-        if run["status"] == "unsuitable":
-            continue
-        # one solved repeat suffices
-        known = solved[run["hash"]]
-        known[run["solver"]] = known.get(run["solver"], False) or bool(run["solved"])
-        if run["solved"]:
-            effort[run["hash"]].append(run["iterations"])
-    solvers = set().union(*tried.values())
-    # in a campaign that was cut, some problems were tried by only some solvers
-    solved = {digest: known for digest, known in solved.items() if tried[digest] == solvers}
-    if not solved:
-        raise ValueError(f"{folder}: has no problem that all solvers were run on at {tol:g}")
-
-    families: dict[str, list[tuple[float, float, str]]] = defaultdict(list)
-    for digest, known in solved.items():
-        failed = 1 - sum(known.values()) / len(known)
-        if failed >= share:
-            least = min(effort[digest], default=np.inf)
-            families[rows[digest]["family"]].append((-failed, -least, rows[digest]["id"]))
-    by_id = {row["id"]: row for row in rows.values()}
-    taken = sorted(name for ranked in families.values() for *_, name in sorted(ranked)[:per_family])
-    return [choice_of_row(folder, by_id[name]) for name in taken]
-
-
-def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
-    """A problem of a catalogue, with the parameters that its file says."""
-    problem = _core.read(folder / (row["global_file"] or row["local_file"]))
-    made = origin_of(problem.info)
-    return Choice(
-        row["family"], made["parameters"], row["seed"], row["number"], row["step"], row["digest"]
-    )
-
-
-def grown(
-    kept: Sequence[Choice], names: Iterable[str], version: str, per_family: int = 5
-) -> tuple[list[Choice], dict[str, Candidates]]:
-    """A list, extended by problems of other sets that the stored runs class as hard or open.
-
-    The problems of the list stay. New problems come from the families of the sets: from each family
-    those that the smallest share of solvers solved, then the first by name. Only families count
-    whose states are stored, or which are assembled directly. If the list has problems of that name
-    from elsewhere, the family is called FAMILY_SET in it.
-
-    Args:
-        kept: the list; a problem without a version is of the version before.
-        names: names of the sets.
-        version: version of the new list.
-        per_family: largest number of problems of a family of a set.
-
-    Returns:
-        The problems in order; and the folders with the states of new ones, by family in the list.
-
-    Raises:
-        KeyError: there is no such set.
-        OSError, RatingError, TrajectoryError: states or results cannot be read.
-    """
-    chosen = [replace(c, since=c.since or str(int(version) - 1)) for c in kept]
-    sources: dict[str, Candidates] = {}
-    for name in names:
-        rows, _ = ratings.ratings_of(name)
-        members = {row.digest for row in rows}
-        wanted: dict[str, list[ratings.RatedProblem]] = defaultdict(list)
-        there = {choice.digest for choice in chosen}
-        for row in rows:
-            # take the first of equal problems
-            if row.rating in ("hard", "open") and row.digest not in there:
-                there.add(row.digest)
-                wanted[row.id.rpartition("/")[0]].append(row)
-        for folder, own in wanted.items():
-            family = folder.partition("/")[2]
-            elsewhere = any(c.family == family and c.digest not in members for c in chosen)
-            label = f"{family}_{name}" if elsewhere else family
-            own.sort(key=lambda row: (row.solved / row.voters, row.id))
-            room = per_family - sum(choice.family == label for choice in chosen)
-            if room <= 0:
-                continue
-            plan = set_index.plan_of(folder)
-            states = None if plan.trajectory is None else trajectory.read(plan.trajectory)
-            sources[label] = Candidates(plan, tuple(plan.numbers().tolist()), states)
-            for row in own[:room]:
-                number = int(row.id.rpartition("/")[2])
-                step = number if states is None else int(states.step[states.index(number)])
-                chosen.append(
-                    Choice(
-                        label,
-                        dict(plan.scene.parameters),
-                        plan.scene.seed or 0,
-                        number,
-                        step,
-                        row.digest,
-                        family if elsewhere else "",
-                        version,
-                    )
-                )
-    return sorted(chosen, key=lambda choice: (choice.family, choice.number)), sources
 
 
 # ---- local

@@ -1,4 +1,4 @@
-"""What building the collection costs: CPU time and the peak of memory of each family.
+"""What building the collection costs: CPU time, size and memory of each family and set.
 
     python -m workshop.sets.collection_cost OUT [NAME...] [--form both] [--with-references]
         [--limit 900] [--results build-cost]
@@ -6,13 +6,17 @@
 NAMES are sets or families; by default all that have stored states, and those that are assembled,
 but the ladder. Each family is built by a process of its own, `fclib collection build` with --jobs 1
 and without pictures. Time and memory are those that the kernel tells of that process and of all
-that it waited for; memory is the largest of one process. A family that OUT has is not built again:
-it has no row. One that runs into --limit has what it took until then, and says so.
+that it waited for; memory is the largest of one process. The size is that of the problems' files. A
+family that runs into --limit has what it took until then, and says so.
+
+OUT/costs.csv has the rows that are finished: after a kill, the same command goes on. Then come the
+sums of each set.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import subprocess
 import sys
@@ -21,11 +25,11 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes
-from fclib.collections import published, set_index
+from fclib.collections import catalog, published, set_index
 from workshop.tables import _results
 
-SETS = ("rt444", "rr9118", "impacts", "existence", "dynamics", "robots", "machines", "simulators")
-LISTS = ("local", "standard", "hard", "tiny")
+LEFT = ("extended", "ladder")  # of all families, and of any size
+COSTS = "costs.csv"
 
 
 def has_states(folder: str) -> bool:
@@ -49,20 +53,45 @@ def built(folder: str, out: Path, options: list[str], limit: float) -> dict[str,
         elif not pid:
             time.sleep(0.05)
     process.returncode = code = os.waitstatus_to_exitcode(status)
+    size = sum(path.stat().st_size for path in (out / folder).glob("*.hdf5"))
     return {
         "family": folder,
         "problems": set_index.problems_of(folder),
         "CPU [s]": f"{usage.ru_utime + usage.ru_stime:.1f}",
+        "files [MB]": f"{size / 1e6:.1f}",
         "memory [GB]": f"{usage.ru_maxrss * 1024 / 1e9:.2f}",
         "ends": {0: "built", -9: f"stopped after {limit:g} s"}.get(code, f"exit status {code}"),
     }
 
 
+def summed(name: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """The sum of some families."""
+    done = sum(row["ends"] == "built" for row in rows)
+    return {
+        "family": name,
+        "problems": sum(int(row["problems"]) for row in rows),
+        "CPU [s]": f"{sum(float(row['CPU [s]']) for row in rows):.0f}",
+        "files [MB]": f"{sum(float(row['files [MB]']) for row in rows):.0f}",
+        "memory [GB]": max((row["memory [GB]"] for row in rows), key=float, default=""),
+        "ends": f"{done} of {len(rows)} built",
+    }
+
+
+def sums(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The sum of each set of several families, and of all."""
+    sets: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        sets.setdefault(row["family"].partition("/")[0], []).append(row)
+    found = [summed(name, own) for name, own in sets.items() if len(own) > 1]
+    return [*found, summed("all", rows)]
+
+
 def main() -> None:
-    """A row for each family, and their sum."""
+    """A row for each family, each set, and all."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("out", type=Path)
-    parser.add_argument("names", nargs="*", default=[*SETS, *LISTS])
+    every = [name for name in set_index.sets() if name not in LEFT]
+    parser.add_argument("names", nargs="*", default=every)
     parser.add_argument("--form", default="both")
     parser.add_argument("--with-references", action="store_true")
     parser.add_argument("--limit", type=float, default=900, help="[s] of the clock, of a family")
@@ -71,22 +100,22 @@ def main() -> None:
     options = ["--form", arguments.form, "--no-pictures"]
     if not arguments.with_references:
         options.append("--no-references")
-    rows = []
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    table = arguments.out / COSTS
+    rows: list[dict[str, Any]] = []
+    if table.is_file():
+        with table.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    done = {row["family"] for row in rows}
     for folder in filter(has_states, set_index.folders(arguments.names)):
-        if (arguments.out / folder).exists():
+        if folder in done:
             continue
         rows.append(built(folder, arguments.out, options, arguments.limit))
+        text = _results.table(list(rows[0]), rows)
+        catalog.replace_file(table, lambda beside, text=text: beside.write_text(text, "utf-8"))
         print(*rows[-1].values(), sep="  ", flush=True)
-    rows.append(
-        {
-            "family": "all",
-            "problems": sum(row["problems"] for row in rows),
-            "CPU [s]": f"{sum(float(row['CPU [s]']) for row in rows):.0f}",
-            "memory [GB]": max((row["memory [GB]"] for row in rows), default=""),
-            "ends": f"{sum(row['ends'] == 'built' for row in rows)} of {len(rows)} built",
-        }
-    )
-    print(*rows[-1].values(), sep="  ")
+    rows += sums(rows)
+    print(*(row for row in rows if "/" not in row["family"]), sep="\n")
     if arguments.results:
         words = "with" if arguments.with_references else "without"
         _results.store(

@@ -1,7 +1,5 @@
-"""The families of a built collection beside the published sets, as a table.
+"""The figures of families that are published, and of ours: what can be compared, and how.
 
-    python -m workshop.sets.collection_table FOLDER... [--sample 8] [--limit 3000]
-        [--results NAME]
     python -m workshop.sets.collection_table --exclusions [--results NAME]
     python -m workshop.sets.collection_table --growth rt444/BoxesStack [--results NAME]
 
@@ -11,14 +9,14 @@ over the smallest that is not zero) are those of fclib.analysis, for a sample of
 spread, of the problems that have at most LIMIT contact components; docs/analysis.md has methods and
 thresholds.
 
-The last column says whether ours has the published range: both ends of each figure are met to 10 %
+`within` says whether ours has the published range: both ends of each figure are met to 10 %
 (conditioning: of its logarithm). Else it names what is not, with the share by which the worse end
-is off.
+is off. workshop/tables/published_beside_ours.py makes the table of both.
 
-With --exclusions, the ends that no problem can have within the published ranges of the other
+--exclusions prints the ends that no problem can have within the published ranges of the other
 figures, to the same tenth: density is three components of a contact over the degrees of freedom.
 
-With --growth, of the stored states of families those that have a quarter more degrees of freedom
+--growth prints, of the stored states of families those that have a quarter more degrees of freedom
 than the one before: how the conditioning grows with the size.
 
 published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
@@ -31,7 +29,6 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -39,7 +36,6 @@ from typing import Any
 import numpy as np
 
 import fclib
-from fclib import collections
 from fclib.analysis._brief import spectrum_of_W
 from fclib.analysis._data import Data, asymmetry
 from fclib.analysis._spectrum import spectrum
@@ -72,7 +68,7 @@ def span(values: Iterable[Any]) -> str:
 
 
 def figures(problem: Any) -> tuple[float, float]:
-    """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN where it does not."""
+    """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN if it does not."""
     data = Data.of_problem(problem)
     found = spectrum_of_W(data, asymmetry(data.W))
     if found is None and data.reduced is not None:
@@ -94,7 +90,7 @@ def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: in
 
 
 def off(published: str, values: Sequence[float], *, logarithm: bool) -> float:
-    """By how much of them the ends of ours differ from the published ones; 0 where none are."""
+    """By how much of them the ends of ours differ from the published ones; 0 if none are."""
     known = [float(value) for value in values if value is not None and np.isfinite(value)]
     if not published or not known:
         return 0.0
@@ -154,7 +150,7 @@ def exclusions(published: dict[str, str]) -> Iterator[dict[str, str]]:
 
 
 def possible(name: str, wide: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """The least and the largest of a figure where the two others are within bounds."""
+    """The least and the largest of a figure of those whose two others are within bounds."""
     (n, most_n), (nc, most_nc), (density, most_density) = (wide[other] for other in COUNTED)
     n, most_n, nc, most_nc = math.ceil(n), math.floor(most_n), math.ceil(nc), math.floor(most_nc)
     if name == "density":
@@ -212,13 +208,12 @@ def line(
 
 
 def main() -> None:
-    """Print the table: each published set, then ours beside it; then those that stand alone."""
+    """Print one of the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("folders", type=Path, nargs="*")
-    parser.add_argument("--sample", type=int, default=8)
-    parser.add_argument("--limit", type=int, default=3000)
-    parser.add_argument("--exclusions", action="store_true", help="of the published ranges alone")
-    parser.add_argument("--growth", nargs="+", metavar="FAMILY", help="of stored families alone")
+    parser.add_argument("--limit", type=int, default=3000, help="contact components")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--exclusions", action="store_true", help="of the published ranges")
+    which.add_argument("--growth", nargs="+", metavar="FAMILY", help="of stored families")
     _results.add_option(parser)
     arguments = parser.parse_args()
     table: list[dict[str, str]] = []
@@ -244,46 +239,15 @@ def main() -> None:
         return
     with PUBLISHED.open(newline="") as file:
         theirs = list(csv.DictReader(file))
-    if arguments.exclusions:
-        for row in theirs:
-            for found in exclusions(row):
-                show(found)
-        if arguments.results:
-            _results.store(
-                arguments.results,
-                table,
-                title="Ends of published ranges that the other ranges of the set exclude",
-                note="All to a tenth, as in the comparison.",
-            )
-        return
-    families: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    where: dict[str, Path] = {}
-    for folder in arguments.folders:
-        for row in collections.read_catalog(folder).to_pylist():
-            name = f"{row['collection']}/{row['family']}"
-            if where.setdefault(name, folder) == folder:
-                families[name].append(row)
-
-    def ours(name: str, published: dict[str, str] | None = None) -> None:
-        rows = families.pop(name)
-        found = spectra(where[name], rows, arguments.sample, arguments.limit)
-        show(line(name, rows, found, within(published, rows, found) if published else ""))
-
     for row in theirs:
-        beside = row.pop("ours")
-        cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
-        show(dict(zip(HEAD, cells, strict=True)))
-        if beside in families:
-            ours(beside, row)
-    for name in sorted(families):
-        ours(name)
+        for found in exclusions(row):
+            show(found)
     if arguments.results:
         _results.store(
             arguments.results,
             table,
-            title="Published sets (in italics) and ours",
-            note=f"Rank ratio and conditioning are of at most {arguments.sample} problems of a"
-            f" family, evenly spread, of at most {arguments.limit} contact components.",
+            title="Ends of published ranges that the other ranges of the set exclude",
+            note="All to a tenth, as in the comparison.",
         )
 
 

@@ -59,7 +59,7 @@ class Tally:
 
 
 def robots(packages: list[str] | None = None) -> Iterator[Robot]:
-    """The MJCF files of installed packages, package by package; of these names where given."""
+    """The MJCF files of installed packages, package by package; of these names if given."""
     wanted = None if packages is None else {_plain(name) for name in packages}
     seen: set[Path] = set()
     for distribution in sorted(metadata.distributions(), key=lambda d: _plain(d.name)):

@@ -66,7 +66,8 @@ def newtons() -> Iterator[tuple[Any, Any, Any]]:
 
 def siconoses() -> Iterator[tuple[Any, Any, Any]]:
     """The same of Siconos, which tells only matrices: without places and turns."""
-    arguments = [str(1 + KEPT * ENGINES["Siconos"].every), repr(0.5 * LEAN / SIZE)]
+    steps = 1 + KEPT * ENGINES["Siconos"].every
+    arguments = recorded_steps.siconos_pile(steps, LEAN)
     for one in steps_of_siconos(SICONOS, arguments, 1):
         yield one, None, None
 
@@ -96,7 +97,7 @@ def record(name: str, out: Path) -> None:
     about: dict[str, Any] = {}
     due = engine.every
     for number, (one, places, turns) in enumerate(engine.steps()):
-        # where nothing touches the next step that has contacts
+        # if nothing touches, the next step that has contacts
         if number >= due and one is not None and one.assembled.problem.nc:
             due += engine.every
             kept.append(step_of(one, number, places, turns, engine.first))

@@ -3,7 +3,7 @@
     python -m workshop.sets.regimes OUT [FAMILY...]
 
 Each scene is simulated by nonsmooth Gauss-Seidel to 1e-3, as packings of thousands of contacts cost
-minutes a step where more is asked: a stored state is what a step begins from, and how it came about
+minutes a step if more is asked: a stored state is what a step begins from, and how it came about
 is no part of its problem. Or its states are those of a stored trajectory, under another law. Of the
 steps whose contacts are as many as published (published_sets.csv), some are kept, evenly spread by
 their number of contacts. Where other figures choose too, a step has all of them as published, to a
@@ -45,7 +45,7 @@ from workshop.sets import collection_table
 
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
 DEEPEST = 0.02  # penetration of a state that is kept, of the smallest body's diameter
-SET = "rr9118"
+SET = "rr9118"  # of the problems of one contact
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 WAY = Simulation(solver="nsgs", tol=1e-3, options={"max_iterations": 100})
 EXACT = Simulation(solver="auto", tol=1e-8)
@@ -66,10 +66,24 @@ class Regime:
     grows: bool = False  # the states of the newest stored version stay, and others join them
     every: int = 1  # of so many steps one is looked at
     version: str = "1"  # of the trajectory
+    collection: str = "rr9118"  # the set
+    scene: str = ""  # the family of its scene, if the set calls it otherwise
 
 
 STEEL = {"young": 2e11, "density": 7800.0, "time_step": 0.0125}
 CHUTE = {"hexahedra": True, "gaps": True, "spheres": 0.0, "slope": 0.6}
+# the column of spheres of the library's sets of 2024; in mm; and with mm as the unit of length
+COLUMN = {
+    **{"spheres": 2000, "radius": 0.7, "spread": 0.0, "density": 0.696, "across": 10},
+    **{"gap": 0.6, "lift": 4.0, "offset": 0.05, "width": 39.0, "all_bodies": True},
+}
+MILLIMETRES = COLUMN | {
+    **{"radius": 9e-4, "gap": 2e-4, "lift": 4e-3, "offset": 5e-5, "width": 0.039},
+    **{"density": 1000.0, "time_step": 5e-5},
+}
+SCALED = COLUMN | {
+    **{"radius": 0.9, "gap": 0.2, "gravity": 9810.0, "density": 1e-6, "time_step": 5e-5}
+}
 REGIMES: dict[str, Regime] = {
     "Chute1000": Regime(
         "Chute_1000",
@@ -126,7 +140,7 @@ REGIMES: dict[str, Regime] = {
         "Capsules",
         {"gaps": True, "activation": 0.0, "margin": 0.04, "gyroscopic": True},
         keep=40,
-        states="rt444/Capsules",
+        states="rr9118/Capsules",
         fill=True,
         version="2",
     ),
@@ -193,6 +207,77 @@ REGIMES: dict[str, Regime] = {
         version="3",
     ),
     "CubesH8x20": Regime("Cubes_H8_20", STEEL | {"upper": 1.0}, keep=1, steps=1, way=EXACT),
+    "Spheres": Regime(
+        "Spheres",
+        COLUMN | {"time_step": 1e-3},
+        keep=50,
+        steps=5000,
+        every=10,
+        collection="fclib2024",
+        scene="SpheresInABox",
+    ),
+    "Spheres1mm": Regime(
+        "Spheres_1mm",
+        MILLIMETRES,
+        keep=50,
+        steps=4000,
+        every=10,
+        collection="fclib2024",
+        scene="SpheresInABox",
+    ),
+    "Spheres1mmScaled": Regime(
+        "Spheres_1mm_scaled",
+        SCALED,
+        keep=46,
+        steps=4000,
+        every=10,
+        collection="fclib2024",
+        scene="SpheresInABox",
+    ),
+    "PrimitiveSoup": Regime(
+        "PrimitiveSoup",
+        {"bodies": 1000, "width": 21.0, "time_step": 2e-3, "all_bodies": True},
+        keep=50,
+        steps=2000,
+        every=5,
+        collection="fclib2024",
+    ),
+    "Chute": Regime(
+        "Chute (2024)",
+        {"grains": 3023, "across": 12, "layers": 12, "spheres": 0.0, "gaps": True}
+        | {"time_step": 2e-3},
+        keep=50,
+        steps=1000,
+        every=5,
+        collection="fclib2024",
+    ),
+    "RollingChute": Regime(
+        "Chute (rolling)",
+        {"grains": 1344, "across": 9, "layers": 9, "spheres": 0.0, "gaps": True}
+        | {"mu_r": 0.01, "time_step": 2e-3},
+        keep=50,
+        steps=1000,
+        every=5,
+        collection="fclib2024",
+    ),
+    "RollingSoup": Regime(
+        "PrimitiveSoup (rolling)",
+        {"bodies": 1000, "width": 21.0, "time_step": 2e-3, "all_bodies": True},
+        keep=50,
+        steps=2000,
+        every=5,
+        collection="fclib2024",
+    ),
+    "SpheresPile": Regime(
+        "SpheresPile (rolling)",
+        {"spheres": 250, "mu_r": 0.03, "time_step": 2.5e-4},
+        keep=188,
+        steps=10000,
+        every=10,
+        way=Simulation(solver="auto", tol=1e-4, options={"time_limit": 5.0}),
+        collection="fclib2024",
+        scene="RollingSpheres",
+    ),
 }
 
 
@@ -207,7 +292,7 @@ class Row:
     dof: int
     contacts: int
     depth: float  # largest penetration, of the smallest body's diameter
-    rank_ratio: float  # of W, as its conditioning; NaN where it is large, or nobody asks
+    rank_ratio: float  # of W, as its conditioning; NaN if it is large, or nobody asks
     conditioning: float
 
     @property
@@ -318,13 +403,14 @@ def chosen(found: list[Row], regime: Regime, there: int = 0) -> list[Row]:
 
 def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     """Write the trajectory of a regime; the problems that were chosen."""
-    family = scenes.get(name)(**regime.parameters)
+    own, folder = regime.collection, f"{regime.collection}/{name}"
+    family = scenes.get(regime.scene or name)(**regime.parameters)
     # a stored scene, as a scene made again may differ in its last digits
-    scene = newest(f"{SET}/{name}").scene if regime.grows else family.scene(0)
+    scene = newest(folder).scene if regime.grows else family.scene(0)
     found = list(rows(name, regime, scene))
     stays: list[Row] = []
     if regime.grows:
-        stays = list(rows(name, replace(regime, states=f"{SET}/{name}"), scene))
+        stays = list(rows(name, replace(regime, states=folder), scene))
         taken = {row.number for row in stays}
         found = [row for row in found if row.number not in taken]
     kept = sorted(stays + chosen(found, regime, len(stays)), key=lambda row: row.number)
@@ -339,10 +425,10 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
         origin = newest(regime.states).origin
         settings = dict(origin["settings"]) | {"states": f"{regime.states}, {origin['version']}"}
     trajectory.write(
-        out / published.file_name(f"{SET}/{name}", regime.version),
+        out / published.file_name(folder, regime.version),
         trajectory.Trajectory(
             scene=scene,
-            origin={"collection": SET, "version": regime.version, "settings": settings},
+            origin={"collection": own, "version": regime.version, "settings": settings},
             exponent=exponent,
             number=np.array([row.number for row in kept]),
             step=np.array([row.step for row in kept]),
@@ -354,7 +440,10 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
         ),
     )
     return [
-        Choice(name, regime.parameters, 0, row.number, row.step, _digest.digest(problem))
+        Choice(
+            *(name, regime.parameters, 0, row.number, row.step, _digest.digest(problem)),
+            scene=regime.scene,
+        )
         for row, problem in zip(kept, problems, strict=True)
     ]
 
@@ -406,12 +495,12 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("families", nargs="*", help="some of them; all by default")
     arguments = parser.parse_args()
-    target = arguments.out / f"{SET}.json"
     arguments.out.mkdir(parents=True, exist_ok=True)
     if arguments.families == ["ChuteLocalProblems"]:
         one_contacts(arguments.out)
         return
     for name in arguments.families or REGIMES:
+        target = arguments.out / f"{REGIMES[name].collection}.json"
         own = make(name, REGIMES[name], arguments.out)
         before = set_index.Choice.read(target) if target.is_file() else ()
         listed = [choice for choice in before if choice.family != name] + own

@@ -6,10 +6,9 @@
 Of each set, `standard` and `tiny` by default, every family whose newest states are deeper than
 `DEEPEST` gets a further version, the set's present one, in which these states are relaxed
 (`fclib.simulate.relaxed`): positions move apart, velocities, numbers and steps stay, and so do the
-states that are within the bound. The lists get the new digests, and for `standard` the table of
-candidates the new rows of its problems; `hard` follows by `fclib collection choose hard`. This
-writes into `collection/` and `python/fclib/collections/data/`, and does nothing where all is within
-the bound. Minutes of CPU, most of them for Chute4000.
+states that are within the bound. The lists get the new digests. This writes into `collection/` and
+`python/fclib/collections/data/`, and does nothing if all is within the bound. Minutes of CPU, most
+of them for Chute4000.
 
 `--results NAME` stores a table of the relaxed states beside those they were made from, and makes
 nothing new.
@@ -26,10 +25,10 @@ from typing import Any
 import numpy as np
 
 from fclib import _digest
-from fclib.collections import published, ratings, set_index, trajectory
+from fclib.collections import published, set_index, trajectory
 from fclib.collections.plan import DEEPEST
 from fclib.simulate import problem_at, relaxed
-from workshop.sets import choose, features, select
+from workshop.sets import choose
 from workshop.tables import _results
 
 SETS = ("standard", "tiny")
@@ -51,7 +50,7 @@ def depth(states: trajectory.Trajectory, contacts: Any) -> float:
 
 
 def mended(states: trajectory.Trajectory, version: str) -> trajectory.Trajectory | None:
-    """A version of states within the bound; None where they are."""
+    """A version of states within the bound; None if they are."""
     model, scheme = states.model, states.scheme
     position = states.position.copy()
     for k in range(len(states)):
@@ -93,24 +92,8 @@ def write_list(name: str, changed: dict[str, trajectory.Trajectory]) -> None:
     choose.write_list(path, choices, rule)
 
 
-def write_candidates(changed: dict[str, trajectory.Trajectory]) -> None:
-    """The table of candidates, with new rows for the problems that changed."""
-    path = ratings.folder() / "candidates.csv"
-    rows = select.read_table(path)
-    for place, row in enumerate(rows):
-        states = changed.get(row["family"])
-        if states is None or row["number"] not in states.number:
-            continue
-        at = states.index(row["number"])
-        if states.digest[at] != row["digest"]:
-            matrix = features.Matrix(states.problem(at).problem)
-            new = {"digest": states.digest[at]} | features.structure(matrix, states.scene)
-            rows[place] = row | new | features.behaviour(matrix)
-    select.write_table(path, rows)
-
-
 def make(name: str) -> None:
-    """Mend the states of a set, its list and the table of candidates."""
+    """Mend the states of a set, and its list."""
     changed = {}
     version = set_index.version(name)
     for folder in published.folders(name):
@@ -124,8 +107,6 @@ def make(name: str) -> None:
             print(target, flush=True)
     if changed:
         write_list(name, changed)
-    if changed and name == "standard":
-        write_candidates(changed)
 
 
 def compared(folder: str) -> dict[str, Any] | None:

@@ -117,7 +117,7 @@ def power(tolerance: float) -> str:
 
 
 def commit() -> str:
-    """The commit of the working tree, with a + where it has changes."""
+    """The commit of the working tree, with a + if it has changes."""
     git = ["git", "-C", str(ROOT)]
     if shutil.which("git") is None:
         return "unknown"

@@ -123,7 +123,7 @@ while time.process_time() < 0.5: pass
 fclib.write_solution(sys.argv[1], fclib.Solution(r=np.array(SOLUTION)))
 fclib.write_attributes(sys.argv[1], "solution", {"cpu_s": 0.001, "iterations": 1})
 """
-SECRET = 0.3  # [s] of CPU that each works for, where it can
+SECRET = 0.3  # [s] of CPU that each works for, if it can
 REST = {  # by what they win, and what it would cost to stop them
     "keeps_a_file": (
         "a file that outlives the run",

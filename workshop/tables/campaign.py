@@ -159,7 +159,7 @@ def short(solver: str) -> str:
 
 
 def compared(store: Path, _: argparse.Namespace) -> list[Table]:
-    """The tables of a store: on the common set, where each family weighs the same."""
+    """The tables of a store: on the common set; each family weighs the same."""
     rows = profiles.load(store)
     every = profiles.gather(rows)
     whole = comparison.compared(every)

@@ -29,7 +29,8 @@ H = 2e-3  # [s]
 STEPS = 500
 MU = 0.5
 KEPT = 5  # one step in so many is judged
-SICONOS = Path(__file__).with_name("_siconos_judged.py")
+SICONOS = _results.ROOT / "workshop/sets/_siconos_boxes.py"
+SICONOS_SCALE = "5"  # of edges of 0.2 m
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ def newtons(scene: str, steps: int) -> Iterator[Any]:
 def siconoses(scene: str, steps: int) -> Iterator[Any]:
     """Siconos' steps."""
     boxes = json.dumps([asdict(box) for box in boxes_of(scene)])
-    yield from recorders.siconos(SICONOS, arguments=[str(steps), boxes])
+    yield from recorders.siconos(SICONOS, arguments=[str(steps), str(H), SICONOS_SCALE, boxes])
 
 
 def ours(scene: str, steps: int) -> Iterator[Any]:

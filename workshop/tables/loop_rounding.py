@@ -236,7 +236,7 @@ def main() -> None:
         note = (
             f"{arguments.steps} steps each. Follow, others: what is left of rows, of length one,"
             " after those that they follow from, the most, and of other rows, the least. Turned:"
-            " the first beside the angle by which the loop is open and the roundings, where it is"
+            " the first beside the angle by which the loop is open and the roundings, if it is"
             " above 1e-9. Gap: of a row from those that it follows from, 1 is what it may be."
             " Named: the least contradiction that is named, of 1e-3 to 1e-12 of the size, 0 for"
             " none: far away from the origin positions are rounded to more than that."

@@ -38,7 +38,7 @@ def contact() -> fclib.LocalProblem:
 
 
 def from_python(problem: fclib.LocalProblem, rounds: int, calls: int) -> dict[str, list[float]]:
-    """Call, and [us] of all of it and of the solver, which is -1 where it is not told."""
+    """Call, and [us] of all of it and of the solver, which is -1 if it is not told."""
     workspace = fclib.Workspace()
     W = np.repeat(np.asarray(problem.W)[None], BATCH, axis=0)
     q, mu = np.repeat(problem.q[None], BATCH, axis=0), np.repeat(problem.mu[None], BATCH, axis=0)

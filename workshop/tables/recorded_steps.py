@@ -11,6 +11,7 @@ all; that of Newton, of Siconos and of FCLIB is of the solve of the problem alon
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import time
@@ -163,10 +164,25 @@ def newtons() -> Iterator[tuple[Any, Any, float]]:
             yield recorders.newton(solver), "hard", took
 
 
+def siconos_pile(steps: int, lean: float = LEAN) -> list[str]:
+    """Arguments of SICONOS: the pile with edges of 1 m, in steps of 5 ms."""
+    out = 0.5 * lean / SIZE
+    boxes = [
+        {
+            "half": [0.5] * 3,
+            "mass": 1.0 + i,
+            "place": [out * i, 0, 0.52 + 1.05 * i],
+            "velocity": [0, 0, 0, 0.1, 0.2, 0.3],
+        }
+        for i in range(BOXES)
+    ]
+    return [str(steps), "0.005", "1", json.dumps(boxes)]
+
+
 def siconoses() -> Iterator[tuple[Any, Any, float]]:
     """Siconos' steps, in steps of 5 ms."""
-    every, last = min(STEPS), max(STEPS)
-    for recorded in recorders.siconos(SICONOS, arguments=[str(last + 1)], every=every):
+    every, arguments = min(STEPS), siconos_pile(max(STEPS) + 1)
+    for recorded in recorders.siconos(SICONOS, arguments=arguments, every=every):
         if round(recorded.time / recorded.h) in STEPS:
             yield recorded, "hard", recorded.more["solve_cpu_s"]
 

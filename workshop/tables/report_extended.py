@@ -167,7 +167,7 @@ def with_pictures(site: Path, total: int) -> str:
     """The catalogue's data, with a picture in each row: a line more."""
     text = (site / "data" / "catalogue.js").read_text(encoding="utf-8")
     column = {"key": "thumb", "label": "picture", "doc": "", "values": [True] * total}
-    # the data are a promise where they are compressed
+    # the data are a promise if they are compressed
     return text + (
         "Fclib.values.catalogue = Promise.resolve(Fclib.values.catalogue).then((known) => {"
         f" known.columns.push({as_json(column)}); return known; }});\n"

@@ -4,7 +4,7 @@
 
 The runs are made up. The times to open need Playwright and a Chromium: from the call to the moment
 that the page shows what it is about, the files in the system's cache; and how much of that its main
-thread computed, which tells more where others use the machine. `--results NAME` stores two tables,
+thread computed, which tells more if others use the machine. `--results NAME` stores two tables,
 NAME of the build and NAME-pages of the opening.
 """
 

@@ -5,7 +5,7 @@
 Nothing is run: the runs are those of campaigns/standard.toml, which `fclib collection status
 standard --add STORE` has taken in (collection/fclib_collection/results/runs.csv). They are compared
 as `fclib profile` compares those of a store (`fclib.bench.comparison`): on the problems that all of
-the solvers take, where each family weighs the same.
+the solvers take; each family weighs the same.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@
 Local problems with a W of random numbers, of numbers that come again and of equal blocks, and the
 local problems in the files, are written by the C library at each level: the least CPU time of the
 repeats, which take the levels by turns, over that of level 0, and the bytes over those of level 0.
-Builds our C library first, where --library names none.
+Builds our C library first, if --library names none.
 """
 
 from __future__ import annotations

@@ -17,10 +17,10 @@ same path. A row says how many problems came to the stage and how many it solved
 solves without the change and with it; and the sum of CPU times with the change over that without
 it, with the 95 % interval of 2,000 bootstrap samples of the problems. The limit is one of CPU time;
 a failure counts as twice the limit. Where both take the same path, they cost the same. A stage pays
-where problems are lost without it, or where its interval is above 1.
+if problems are lost without it, or if its interval is above 1.
 
 --rules changes each number of the table instead, and each default that it uses: half and double, a
-tenth and ten times where it is small or large. The problems are those that the table solves. A
+tenth and ten times if it is small or large. The problems are those that the table solves. A
 second table, NAME-notable, has the rows in which a problem is lost, or whose interval does not have
 1 in it. The rules of "held bodies" are tried by constants.py.
 
@@ -379,7 +379,7 @@ def changes(lines: list[str]) -> list[Change]:
 
 
 def numbered(names: Sequence[str], k: int) -> str:
-    """The name of a stage, with its number where several have it."""
+    """The name of a stage, with its number if several have it."""
     return names[k] if names.count(names[k]) == 1 else f"{names[k]} {1 + names[:k].count(names[k])}"
 
 

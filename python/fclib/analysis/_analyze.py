@@ -303,7 +303,7 @@ def analyze(
         rank = None
     else:
         found = spectrum(reduced.W, dense, reduced.rounding)
-        sign = _definiteness(data, reduced, found, dense)
+        sign = definiteness(data, reduced, found, dense)
         rank = None if found.doubtful else found.rank
         if rank is not None:
             spectra["W"] = found
@@ -361,7 +361,7 @@ def definite_by_bodies(data: Data) -> bool:
     return G is None or least_singular(G.T) > 0
 
 
-def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:
+def definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:
     """The definiteness of the symmetric part of W, or of W'."""
     symmetric = columns((reduced.W + reduced.W.T) / 2)
     if found.extremes is not None:

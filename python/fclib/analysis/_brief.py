@@ -1,8 +1,9 @@
 """The cheap part of the analysis, for every file that is built.
 
-Ranks and conditioning by dense eigenvalues of blocks up to a small size, of W on the bodies if
-these are fewer: the nonzero eigenvalues of W are those of M^-1/2 H H^T M^-1/2. Slater's condition
-without a conic program, uniqueness if a theorem gives it. `analyze` does the rest.
+Ranks and conditioning of all matrices, dense up to RANKS rows, of W on the bodies if these are
+fewer: the nonzero eigenvalues of W are those of M^-1/2 H H^T M^-1/2. Above they are estimated.
+Slater's condition without a conic program, uniqueness if a theorem gives it. `analyze` does the
+rest.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
+from scipy.sparse.csgraph import structural_rank
+from scipy.sparse.linalg import splu
 
 from fclib import _core, _solve
 from fclib._judge import judge
@@ -20,11 +23,12 @@ from fclib.analysis._analyze import (
     UNKNOWN,
     Definiteness,
     definite_by_bodies,
+    definiteness,
     enumerated,
     indefinite_in_part,
     uniqueness,
 )
-from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
+from fclib.analysis._data import DENSE, EPS, SYMMETRIC, Data, Local, asymmetry, columns
 from fclib.analysis._enumerate import Enumeration
 from fclib.analysis._existence import (
     EXISTS_AT_HAND,
@@ -36,9 +40,10 @@ from fclib.analysis._existence import (
 )
 from fclib.analysis._joints import joints_of
 from fclib.analysis._reactions import reactions
-from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
+from fclib.analysis._spectrum import LANCZOS, Spectrum, bidiagonal, quick_spectrum
 
-SIDE = 1000  # largest side of a block that is treated densely
+RANKS = 5000  # largest side of a block whose rank and conditioning are found; a minute of CPU
+SIDE = 1000  # largest side of a block that is treated densely for other facts
 JOINTS = 0.5  # [s] wall clock limit for deciding whether joints agree
 
 
@@ -78,24 +83,23 @@ def brief(
     """
     data = Data(problem, local)
     matrices = data.matrices
-    left_out = ["conditioning of H", "conic programs"]
+    left_out = ["conic programs"]
     if states is None:
         left_out.append("states of the contacts")
     skewness = asymmetry(matrices["W"])
+    spectra = {name: quick_spectrum(matrices[name], RANKS) for name in matrices if name != "W"}
     found = spectrum_of_W(data, skewness)
-    spectra: dict[str, Spectrum] = {}
-    if found is None:
-        left_out.insert(0, "rank of W" if problem.p == 0 else "rank of W' = W - V R^-1 V^T")
-        sign = Definiteness(UNKNOWN, np.nan, np.nan, "left out", np.nan)
-    else:
+    sign = Definiteness(UNKNOWN, np.nan, np.nan, "left out", np.nan)
+    if found is not None:
         spectra["W"] = found
-        sign = sign_of(data, found)
-    for name in ("M", "R"):
-        if name in matrices and not blocks_of(matrices[name], SIDE, square=True).sparse:
-            spectra[name] = spectrum(matrices[name], SIDE)
-    rank = found.rank if found is not None else None
+    if found is not None and not found.estimate:
+        sign = sign_of(data, found, skewness)
+    known = found is not None and not found.estimate and not found.doubtful
+    rank = found.rank if found is not None and known else None
     full = rank == problem.m and sign.word == DEFINITE[0]
-    semidefinite = sign.word in DEFINITE[:2] or (found is None and definite_by_bodies(data))
+    if problem.p and max(problem.n, problem.m, problem.p) > DENSE:
+        full = False  # what follows from a regular W' is not tried there
+    semidefinite = sign.word in DEFINITE[:2] or (sign.word == UNKNOWN and definite_by_bodies(data))
     joints = joints_of(data, JOINTS)
     condition = slater(data, joints, semidefinite, full, conic=False)
     unique = uniqueness(data, joints, sign, full, SIDE if full else 0)
@@ -121,20 +125,29 @@ def brief(
         tried = "tried: " if unique.verdict == UNDECIDED else ""
         words.append(f"Velocity: {unique.verdict}: {tried}{unique.reason}.")
         words.append(f"Reactions: {forces.verdict}: {forces.reason}.")
-    if found is not None:
-        words.append(f"W is {sign.word}, of rank {rank} of {problem.m}.")
+    name = "W" if problem.p == 0 else "W' = W - V R^-1 V^T"
+    if found is None:
+        words.append(f"{name} is not known: it is only the rounding of that difference.")
+    elif rank is None:
+        most = "at most " if found.estimate else "doubtful: "
+        words.append(f"The rank of {name} is {most}{found.rank} of {problem.m}.")
+    else:
+        skew = f", not symmetric by {skewness:.2g}" if skewness > SYMMETRIC else ""
+        words.append(f"{name} is {sign.word}, of rank {rank} of {problem.m}{skew}.")
     words.append(f"Left out: {', '.join(left_out)}.")
     numbers = local.islands().contact
     return Brief(
-        matrix_info_of(matrices, spectra),
+        matrix_info_of(matrices, spectra, joints=problem.p > 0),
         " ".join(words),
         {
             "islands": int(numbers.max(initial=-1)) + 1,
             "largest_island": int(np.bincount(numbers).max(initial=0)),
             "asymmetry_W": skewness,
-            "definiteness": None if found is None else sign.word,
+            "definiteness": None if sign.word == UNKNOWN else sign.word,
+            "rank_H": exact(spectra.get("H"), "rank"),
+            "conditioning_H": exact(spectra.get("H"), "conditioning"),
             "rank_W": rank,
-            "conditioning_W": None if found is None else digits(found.conditioning),
+            "conditioning_W": None if rank is None else exact(found, "conditioning"),
             "hyperstaticity": None if rank is None else problem.m - rank,
             "slater": condition.holds,
             "existence": None if existence == UNDECIDED else existence,
@@ -145,26 +158,65 @@ def brief(
     )
 
 
+def exact(found: Spectrum | None, name: str) -> Any:
+    """A fact on a spectrum, for a catalogue; None of an estimate."""
+    if found is None or found.estimate:
+        return None
+    value = getattr(found, name)
+    return digits(value) if isinstance(value, float) else value
+
+
 def spectrum_of_W(data: Data, skewness: float) -> Spectrum | None:
-    """Spectrum of W, on the bodies if these are fewer; None with joints, or if it costs much."""
+    """Spectrum of W, on the bodies if these are fewer, or of W'; None if that is only rounding."""
     problem = data.problem
-    if problem.p or skewness > SYMMETRIC:
-        return None
-    if problem.n and problem.n < problem.m:
+    if problem.p:
+        reduced = data.reduced_within(RANKS)
+        if reduced is not None:
+            return quick_spectrum(reduced.W, RANKS, reduced.rounding)
+        above = max(problem.n, problem.m, problem.p) > RANKS
+        return estimate_with_joints(data) if above else None
+    if skewness <= SYMMETRIC and 0 < problem.n < problem.m:
         gram = on_bodies(data)
-        if gram is None or blocks_of(gram, SIDE, square=True).sparse:
-            return None
-        found = spectrum(gram, SIDE)
-        return replace(found, method=f"{found.method} on the bodies")
-    if blocks_of(data.W, SIDE, square=True).sparse:
+        if gram is not None:
+            found = quick_spectrum(gram, RANKS)
+            return replace(found, method=f"{found.method} on the bodies")
+    found = quick_spectrum(data.W, RANKS)
+    if found.estimate and problem.n:
+        most = min(found.rank, int(structural_rank(data.matrices["H"])), problem.n)
+        found = replace(found, rank=most)
+    return found
+
+
+def estimate_with_joints(data: Data) -> Spectrum | None:
+    """An estimate of the rank and the conditioning of a large W'; None if R is singular."""
+    W, V, R = (data.matrices[name] for name in ("W", "V", "R"))
+    try:
+        factors = splu(columns(R))
+    except RuntimeError:
         return None
-    return spectrum(data.W, SIDE)
+    values = bidiagonal(
+        lambda x: W @ x - V @ factors.solve(V.T @ x),
+        lambda y: W.T @ y - V @ factors.solve(V.T @ y, "T"),
+        data.problem.m,
+    )
+    top = float(values.max(initial=0.0))
+    threshold = max(W.shape) * EPS * top
+    smallest = float(values[values > threshold].min(initial=np.inf))
+    free = data.problem.n - data.problem.p if data.problem.n else data.problem.m
+    return Spectrum(
+        max(0, min(int(structural_rank(W)), free)),
+        top,
+        smallest if np.isfinite(smallest) else 0.0,
+        f"the structural rank and {LANCZOS} steps of Lanczos",
+        threshold,
+        estimate=True,
+    )
 
 
 def on_bodies(data: Data) -> Any:
     """M^-1/2 H H^T M^-1/2 as csc_array; None if M is not positive definite, or too large."""
     M, H = data.matrices["M"], data.matrices["H"]
-    if data.problem.n > SIDE or asymmetry(M) > SYMMETRIC:
+    if data.problem.n > RANKS or asymmetry(M) > SYMMETRIC:
         return None
     # zeros between bodies stay exact, so that the blocks are found again
     gram = (H @ H.T).toarray()
@@ -177,8 +229,18 @@ def on_bodies(data: Data) -> Any:
     return columns((gram + gram.T) / 2)
 
 
-def sign_of(data: Data, found: Spectrum) -> Definiteness:
-    """The definiteness of W: on the bodies it is a square without negative eigenvalues."""
+def sign_of(data: Data, found: Spectrum, skewness: float) -> Definiteness:
+    """The definiteness of W: on the bodies it is a square without negative eigenvalues.
+
+    With joints, or of an asymmetric W, it is found as `analyze` finds it, if W is small.
+    """
+    if data.problem.p or skewness > SYMMETRIC:
+        reduced = data.reduced if data.problem.m <= DENSE else None
+        if reduced is None:
+            return Definiteness(UNKNOWN, np.nan, np.nan, "left out", np.nan)
+        sign = definiteness(data, reduced, found, DENSE)
+        # if a rank may be rounding, only what is indefinite is certain
+        return replace(sign, word=UNKNOWN) if found.doubtful and sign.word != DEFINITE[2] else sign
     size = data.problem.m
     bodies = data.problem.n and data.problem.n < size
     low, high = found.extremes if found.extremes is not None else (0.0, found.largest)
@@ -195,9 +257,9 @@ def sign_of(data: Data, found: Spectrum) -> Definiteness:
 
 
 def matrix_info_of(
-    matrices: dict[str, Any], spectra: dict[str, Spectrum]
+    matrices: dict[str, Any], spectra: dict[str, Spectrum], joints: bool = False
 ) -> dict[str, _core.MatrixInfo]:
-    """The sparsity of each matrix, and known facts on its singular values."""
+    """The sparsity of each matrix, and known facts on its singular values; with joints of W'."""
     known = {}
     for name, matrix in matrices.items():
         entries = max(1, matrix.shape[0] * matrix.shape[1])
@@ -206,9 +268,16 @@ def matrix_info_of(
         if found is None:
             known[name] = _core.MatrixInfo(comment=comment)
             continue
-        of = "" if found.rank == min(matrix.shape) else " of what is not singular"
-        comment += f"; rank and conditioning{of} by {found.method}"
-        comment += f", zero below {found.threshold:.0e}"
+        full = found.rank == min(matrix.shape)
+        whose = " of W' = W - V R^-1 V^T" if joints and name == "W" else ""
+        if found.estimate:
+            comment += f"; rank{whose} at most, conditioning at least, by {found.method}"
+        else:
+            of = "" if full else " of what is not singular"
+            comment += f"; rank and conditioning{of}{whose} by {found.method}"
+        if found.doubtful:
+            comment += f"; {found.doubtful} more singular values may be rounding"
+        comment += f"; zero is below {found.threshold:.0e}"
         known[name] = _core.MatrixInfo(
             comment=comment, rank=found.rank, conditioning=digits(found.conditioning)
         )

@@ -106,9 +106,13 @@ class Data:
         Of a symmetric global problem it is A^T A, with A the part of M^-1/2 H orthogonal to the
         range of M^-1/2 G. So there is no difference of large terms, and joints may be redundant.
         """
+        return self.reduced_within(DENSE)
+
+    def reduced_within(self, limit: int) -> Reduced | None:
+        """The same; None also if a side is above the limit."""
         if self.problem.p == 0:
             return Reduced(self.W, 0.0)
-        if max(self.problem.n, self.problem.m, self.problem.p) > DENSE:
+        if max(self.problem.n, self.problem.m, self.problem.p) > limit:
             return None
         problem = self.problem
         if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)) and (

@@ -133,9 +133,9 @@ class Enumeration:
         if not self.complete:
             words.append(f"; not all states were decided: {self.missing}")
         elif not self.robust:
-            words.append(f"; there may be others where q changes by {ROBUST:.0e} ||q||")
+            words.append(f"; there may be others if q changes by {ROBUST:.0e} ||q||")
         elif not self.solutions:
-            words.append(f", also where q changes by {ROBUST:.0e} ||q||")
+            words.append(f", also if q changes by {ROBUST:.0e} ||q||")
         return "".join(words)
 
     @property

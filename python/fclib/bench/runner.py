@@ -296,7 +296,7 @@ def warn_of_load(busy: int, tell: Callable[[str], None]) -> None:
     elif load + busy > cores + 0.5:
         tell(
             f"the machine has other work, load {load:.1f} on {cores} cores: times may be longer"
-            " than they would be, and are marked where the load was above the number of cores"
+            " than they would be, and are marked if the load was above the number of cores"
         )
 
 

@@ -88,7 +88,7 @@ REPORTABLE = frozenset(STATUSES) - {*SURROUNDINGS, "lied"} | {"no_space", "kille
 
 def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
     """The guess of an order, from the solution of an earlier problem, contact by contact."""
-    from fclib.collections.guesses import guess_of  # few runs need it
+    from fclib.collections.references import guess_of  # few runs need it
 
     multipliers = None if known["l"] is None else np.array(known["l"], float)
     return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)

@@ -109,8 +109,8 @@ def build_plans(
         brief = [plan for plan in plans if plan.references and not plan.analyze]
         if rows and brief:
             out.print(
-                "The files say what is cheap to find out. --analyze finds the rest: the "
-                "conditioning of H, and whether there is a solution if that is hard to tell."
+                "The files say what is cheap to find out. --analyze finds the rest: self-stresses, "
+                "and whether there is a solution if that is hard to tell."
             )
         if sequence is None:
             out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
@@ -181,6 +181,7 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 ),
                 "problems": len(own),
                 "distinct": catalog.distinct(own),
+                "trivial": sum(row["trivial"] is not None for row in own),
                 "solved": sum(map(catalog.is_answered, own)) if tried else "",
                 "dof": span("n"),
                 "contacts": span("nc"),

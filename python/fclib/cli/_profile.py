@@ -260,7 +260,7 @@ def show_pairs(pairs: Sequence[dict[str, Any]], best: str, tol: float) -> None:
         )
     if records:
         out.print()
-        title = f"Geometric means of ratios to {best}, where both solve; tolerance {tol:g}"
+        title = f"Geometric means of ratios to {best}, of what both solve; tolerance {tol:g}"
         out.print(Rows(records, title))
 
 

@@ -425,7 +425,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
     raise typer.Exit(int(report.failed))
 
 
-FOUND = ("id", "nc", "n", "mu_max", "law", "formulation", "rating", "same_as")
+FOUND = ("id", "nc", "n", "mu_max", "law", "formulation", "rating", "trivial", "same_as")
 
 
 @app.command()
@@ -444,7 +444,8 @@ def find(
     """Find the problems of a collection by the columns of its catalogue.
 
     A condition compares columns, numbers and texts, with and, or, not and brackets. A comparison
-    with a missing value is not true. "same_as is None" leaves out the copies.
+    with a missing value is not true. "same_as is None" leaves out the copies, and "trivial is None"
+    what r = 0 solves.
     """
     folder = folder or library.default_folder()
     report = Report(as_json)
@@ -468,7 +469,10 @@ def find(
     if not (as_json or files):
         if rows:
             out.print(Rows(report.records))
-        out.print(f"{len(rows)} of {table.num_rows} problems")
+        told = f"{len(rows)} of {table.num_rows} problems"
+        if (different := catalog.distinct(rows)) < len(rows):
+            told += f", {different} of them distinct"
+        out.print(told)
 
 
 @app.command()

@@ -267,7 +267,7 @@ def command(
         str | None,
         typer.Option(
             help="local, global, local_rolling or global_rolling: which problem of a file that "
-            "holds several, or what a text holds where its sizes should not decide."
+            "holds several, or what a text holds if its sizes should not decide."
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there already.")] = False,

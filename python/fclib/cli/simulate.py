@@ -37,7 +37,8 @@ def command(
     scene: Annotated[
         Path,
         typer.Argument(
-            help="An MJCF file, a URDF file, an input.dat of Siconos, or an LMGC90 deck (DATBOX).",
+            help="An MJCF or URDF file, an input.dat or a mechanics HDF5 file of Siconos, or an"
+            " LMGC90 deck (DATBOX).",
             show_default=False,
         ),
     ],
@@ -266,7 +267,7 @@ def command(
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")
-    except (OSError, ValueError) as error:
+    except (ImportError, OSError, ValueError) as error:
         fail(words_of(error))
     for line in model.left_out:
         err.print(f"Left out: {line}", highlight=False)

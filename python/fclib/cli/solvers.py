@@ -104,7 +104,7 @@ def show(solver: fclib.SolverInfo) -> None:
         "from": solver.origin,
         "citation": solver.citation,
         "takes": f"{', '.join(takes)}; global and mixed problems are brought to the local form",
-        "iterations": f"at most {solver.max_iterations:,}, where no other limit is given",
+        "iterations": f"at most {solver.max_iterations:,} if no other limit is given",
     }
     for name, text in lines.items():
         if text:

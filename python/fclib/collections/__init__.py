@@ -18,15 +18,15 @@ published.py  the trajectories of all published versions. Needs trajectory.py
 set_index.py  the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem, in catalog.parquet. Needs no other module
-references.py solutions: finds them, judges them by both maps, stores them. Needs catalog.py
+references.py solutions: finds them, judges them by both maps, stores them; makes guesses of them.
+              Needs catalog.py
 build.py      makes the files of a family; goes on after a kill. Needs plan.py, references.py and
               ratings.py
 verify.py     compares files with the catalogue, and judges solutions again
 add.py        takes existing files in as a set. Needs build.py, set_index.py, references.py
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, set_index.py
-guesses.py    a guess for the next step's problem, from a solution
-sequence.py   consecutive problems, with guesses, and their file. Needs guesses.py, library.py
+sequence.py   consecutive problems, with guesses, and their file. Needs references.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
 ratings.py    which problems are easy, hard or open, by stored runs. Needs set_index.py
 
@@ -37,11 +37,11 @@ from fclib.collections.add import Refusal, Rules, add, plain
 from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
-from fclib.collections.guesses import guess_of
 from fclib.collections.library import Collection, load
 from fclib.collections.plan import Plan, Selection, Simulation, families
 from fclib.collections.published import VersionError, file_name
 from fclib.collections.record import record
+from fclib.collections.references import guess_of
 from fclib.collections.sequence import Step, sequence, write_sequence
 from fclib.collections.set_index import (
     folders,

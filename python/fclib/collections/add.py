@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _sequence
-from fclib._judge import MARK, TOLERANCE, judge
+from fclib._judge import MARK, TOLERANCE, judge, trivial
 from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
@@ -193,7 +193,7 @@ class Part:
         kind = "global" if "global" in kinds else kinds[0]
         problem: Any = _core.read(path, kind)
         own = _core.read_solution(path)
-        found = self._reference(problem, own)
+        found, untried = self._reference(problem, own)
         form = "global" if problem.kind.startswith("global") else "local"
         file = self.catalogue.parent / f"{number:04d}-{form}.hdf5"
 
@@ -205,11 +205,14 @@ class Part:
                 _sequence.copy(path, beside)
                 if found is not None:
                     _core.write_attributes(beside, "solution", found.attributes)
+                else:
+                    _core.write_attributes(beside, "info", {MARK: untried})
                 return
             # if it is not a solution, it is removed with all facts stored of it
             told = _core.read_attributes(path, "info")
             told.pop(MARK, None)
-            references.write(beside, problem, found, _core.read_guesses(path), several)
+            guesses = _core.read_guesses(path)
+            references.write(beside, problem, found, guesses, several, untried)
             if told:
                 _core.write_attributes(beside, "info", told)
 
@@ -227,6 +230,7 @@ class Part:
             "number": number,
             **facts_of(problem),
             "nnz_W": nnz(problem.W) if form == "local" else None,
+            "trivial": trivial(problem),
             **(found.row | {"tol": self.rules.tol} if found is not None else {}),
             **dict.fromkeys(catalog.FILES),
             **stored,
@@ -234,15 +238,15 @@ class Part:
             "citation": self.rules.citation,
         }
 
-    def _reference(self, problem: Any, own: _core.Solution | None) -> Found | None:
-        """The best known solution: the file's own, or a better one; None if there is none."""
+    def _reference(self, problem: Any, own: _core.Solution | None) -> tuple[Found | None, str]:
+        """The best known solution: the file's own, or a better one; or None, and why."""
         rules = self.rules
         of_file = references.given(problem, own, OF_FILE) if own is not None else None
         if not rules.references or (of_file is not None and of_file.ok):
-            return of_file
+            return of_file, references.NOT_TRIED
         try:
             found = references.find(problem, "auto", rules.tol, time_limit=rules.time_limit)
-        except _core.Error:  # M is singular; the problem is kept all the same
-            return of_file
+        except _core.Error as error:  # M is singular; the problem is kept all the same
+            return of_file, f"none is known: no solver takes the problem: {error}"
         better = of_file is None or found.refuted or found.error < of_file.error
-        return found if better else of_file
+        return (found if better else of_file), ""

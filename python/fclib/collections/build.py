@@ -32,14 +32,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib._judge import TOLERANCE
+from fclib._judge import TOLERANCE, trivial
 from fclib._origin import origin_of
 from fclib.collections import catalog, ratings, references, trajectory
 from fclib.collections.catalog import STATE
-from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
 from fclib.collections.record import record
-from fclib.collections.references import Found
+from fclib.collections.references import Found, guess_of
 
 if TYPE_CHECKING:
     from fclib.analysis import Enumeration
@@ -50,6 +49,8 @@ COMPRESSION = 1  # level 1: 2 % more bytes than level 6 in two thirds of the tim
 SMALL_PLANAR, SMALL_UNKNOWNS = 3, 12
 CHECKPOINT = 5.0  # seconds between two checkpoints
 LISTING = 0.05  # share of a build's time that may go into the catalogue of all
+# attribute of `info` in a file of a simulated problem without a guess: the reason
+GUESS, NO_GUESS = "guess", "none: the states do not have the step before, nor what it carried over"
 TOLD = 0.1  # seconds between two messages of progress
 
 Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, their number
@@ -329,7 +330,8 @@ def build_scene(
                 item = item_of(plan, states, number)
                 if before is None and number and plan.references:
                     before = stored_before(plan, kept, out)
-                before = store(plan, kept, item, before, out)
+                guess = guess_for(plan, states, item, before)
+                before = store(plan, kept, item, guess, out)
             kept.looked += 1
             report(plan.name, kept.looked, plan.total)
     except BaseException:  # Control-C too
@@ -373,9 +375,9 @@ def reference(plan: Plan, problem: Any) -> Found | None:
 
 @dataclass(frozen=True)
 class Before:
-    """The problem that was stored before, and its solution."""
+    """A problem, and its solution or the best iterate."""
 
-    step: int
+    number: int
     problem: Any
     solution: _core.Solution
 
@@ -387,40 +389,78 @@ def stored_before(plan: Plan, kept: Kept, out: Path) -> Before | None:
         return None
     path = out / str(row["global_file"] or row["local_file"])
     solution = _core.read_solution(path)
-    return None if solution is None else Before(row["step"], _core.read(path), solution)
+    return None if solution is None else Before(row["number"], _core.read(path), solution)
 
 
-def guesses_of(plan: Plan, item: Item, before: Before | None) -> list[_core.Solution]:
-    """The impulses that the same contacts had in the step before, if that step was stored.
+def guess_for(
+    plan: Plan, states: trajectory.Trajectory | None, item: Item, before: Before | None
+) -> _core.Solution | None:
+    """What the simulation carried over from the step before; None if that is not known.
 
-    For a step of another engine they are the impulses of that engine.
-
-    If the hard problems are selected, later problems decide what is stored; so there are none.
+    It follows from the states alone, whichever problems are built: the reactions of the same
+    contacts in the reference of the step before, which is found for this if it is not built; zeros
+    if that step had no contact; or those that are stored with the states. For a step of another
+    engine they are the reactions of that engine.
     """
     reaction = getattr(getattr(plan.scene, "family", None), "reaction", None)
     if reaction is not None:
-        return [reaction(item.step)]
-    if before is None or before.step + 1 != item.step or plan.select == "hard":
-        return []
-    guess = guess_of(before.problem, before.solution, item.problem)
-    return [] if guess is None else [guess]
+        known: _core.Solution = reaction(item.step)
+        return known
+    if states is None:
+        return None
+    problem, place = item.problem, int(np.searchsorted(states.step, item.step))
+    multipliers = np.zeros(problem.p) if problem.p else None
+    stored = states.guess[place] if states.guess else None
+    if stored is not None and len(stored) == problem.spacedim * problem.nc:
+        return _core.Solution(r=stored, l=multipliers)
+    number = int(states.number[place])
+    follows = place > 0 and int(states.number[place - 1]) == number - 1
+    if follows and int(states.step[place - 1]) == item.step - 1:
+        if before is None or before.number != number - 1:
+            before = solved_before(plan, states, number - 1)
+        return guess_of(before.problem, before.solution, problem) if before is not None else None
+    if follows or (number == 0 and (item.step == 0 or not states.scene.begin)):
+        return _core.Solution(r=np.zeros(problem.spacedim * problem.nc), l=multipliers)
+    return None
 
 
-def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) -> Before | None:
+def solved_before(plan: Plan, states: trajectory.Trajectory, number: int) -> Before | None:
+    """The reference of a problem that is not built, or its best iterate."""
+    item = item_of(plan, states, number)
+    found = solutions_of(plan, item.problem)[0]
+    if found is None or found.refuted:
+        return None
+    return Before(number, item.problem, found.solution)
+
+
+def solutions_of(
+    plan: Plan, problem: Any
+) -> tuple[Found | None, list[_core.Solution], Enumeration | None]:
+    """The reference solution, all known ones if there are several, and the states of contacts."""
+    found, states = reference(plan, problem), states_of_contacts(plan, problem)
+    several, by = isolated_of(states), "enumeration"
+    if found is not None:
+        if not several and (more := references.others(problem, found)):
+            several, by = [_core.Solution(r=found.solution.r, l=found.solution.l), *more], "nsn-ac"
+        found = references.best_first(found, problem, several, by)
+    return found, several, states
+
+
+def store(
+    plan: Plan, kept: Kept, item: Item, guess: _core.Solution | None, out: Path
+) -> Before | None:
     """Write a problem's files, remove those of problems that it replaces, and return it."""
     is_global = item.problem.kind.startswith("global")
+    simulated = not isinstance(plan.scene, scenes.Assembled)
     local = item.problem.condense() if is_global else item.problem
     sweeps = None
     if plan.select == "hard":
         trial = _solve.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
         sweeps = trial.iterations
-    found = reference(plan, item.problem)
-    guesses = guesses_of(plan, item, before)
-    row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
-    states = states_of_contacts(plan, item.problem)
-    several = solutions_of(states)
+    row = describe(plan, kept.looked, item)
+    row |= {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps, "trivial": trivial(local)}
+    found, several, states = solutions_of(plan, item.problem)
     if found is not None:
-        found = references.best_first(found, item.problem, several)
         row |= found.row | {"tol": plan.tol}
     words, known = known_of(plan, item.problem, local, found, states, row)
     info = stamped(item.problem.info, plan, kept.looked, words)
@@ -438,17 +478,19 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
                 if getattr(problem, name, None) is not None
             },
         )
-        own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
+        own = [] if guess is None else [_core.Solution(r=guess.r, l=guess.l)]
         references.write(
             out / path, with_info, mine, own, several, compression=COMPRESSION, sync=False
         )
+        if guess is None and simulated:
+            _core.write_attributes(out / path, "info", {GUESS: NO_GUESS})
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
         for file, _ in catalog.files_of({**dict.fromkeys(catalog.FILES), **gone}):
             (out / file).unlink(missing_ok=True)
-    if found is None or not found.ok:
+    if found is None or found.refuted:
         return None
-    return Before(item.step, item.problem, found.solution)
+    return Before(row["number"], item.problem, found.solution)
 
 
 def known_of(
@@ -498,7 +540,7 @@ def is_small(problem: Any) -> bool:
     return bool(problem.nc <= most and problem.n + problem.p <= SMALL_UNKNOWNS)
 
 
-def solutions_of(states: Enumeration | None) -> list[_core.Solution]:
+def isolated_of(states: Enumeration | None) -> list[_core.Solution]:
     """All isolated solutions."""
     isolated = states.isolated if states is not None else ()
     return [_core.Solution(r=one.solution.r, l=one.solution.l) for one in isolated]

@@ -117,7 +117,7 @@ class Handed:
         turns = rotations(turn[state])
         H = levers(number[body], point, frame, pose[state, :3], turns)
         M, f = self.inertia_of(moved, twist[state], h)
-        return _core.GlobalProblem(
+        problem = _core.GlobalProblem(
             spacedim=3,
             M=M,
             H=H,
@@ -134,8 +134,9 @@ class Handed:
                 tangent=frame[:, 1],
                 gap=self.gap[rows],
             ),
-            bodies=self.bodies(pose[:, :3], turn),
         )
+        bodies = self.bodies(pose[:, :3], turn)
+        return problem.replace(bodies=bodies.started(twist[state].ravel(), problem))
 
     def inertia_of(self, moved: Integers, twist: Vector, h: float) -> tuple[Any, Vector]:
         """M and f of some solids with their velocities."""
@@ -179,6 +180,10 @@ class Handed:
             shape_place=np.zeros((count, 3)),
             shape_turn=np.array([solid.shape_turn for solid in self.solids]),
             shape_mesh=np.full(count, -1, np.int32),
+            mass=np.array([solid.mass for solid in self.solids]),
+            inertia=np.array([solid.inertia for solid in self.solids]),
+            center=np.zeros((count, 3)),
+            axes=np.tile([1.0, 0, 0, 0], (count, 1)),
         )
 
 

@@ -52,7 +52,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
                 f"{part.parent}: holds version {found} of {name}, and the present one is {wanted}:"
                 " remove it, or name another folder (FCLIB_COLLECTION); its problems are read from"
                 " there by their files, and fclib collection build"
-                f" {name} --version {found} makes them where that version is stored"
+                f" {name} --version {found} makes them if that version is stored"
             )
         return
     source = os.environ.get(SOURCE)

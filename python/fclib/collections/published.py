@@ -9,13 +9,13 @@ checkout. Versions are counted 1, 2, ...; without a version the newest one is us
 from __future__ import annotations
 
 import functools
-import importlib.util
 from pathlib import Path
 
+from fclib import _stored
 from fclib.collections import trajectory
 
-PACKAGE = "fclib_collection"
-IN_PLACE = Path(__file__).resolve().parents[3] / "collection" / PACKAGE
+PACKAGE = _stored.COLLECTION
+IN_PLACE = _stored.CHECKOUT / "collection" / PACKAGE
 FOLDER = "trajectories"
 
 
@@ -28,12 +28,8 @@ class VersionError(KeyError):
 
 def root() -> Path | None:
     """The folder of the published trajectories; None if the package is not installed."""
-    if IN_PLACE.is_dir():
-        return IN_PLACE / FOLDER
-    spec = importlib.util.find_spec(PACKAGE)
-    if spec is None or spec.origin is None:
-        return None
-    return Path(spec.origin).parent / FOLDER
+    package = _stored.folder_of(PACKAGE, IN_PLACE)
+    return package / FOLDER if package is not None else None
 
 
 def folders(name: str) -> list[str]:

@@ -45,8 +45,9 @@ class Recorded:
     digest: list[str] = field(default_factory=list)
     structure: list[str] = field(default_factory=list)
     sketch: list[Any] = field(default_factory=list)
+    guess: list[Any] = field(default_factory=list)  # None: not known
 
-    def add(self, step: int, position: Any, velocity: Any, problem: Any) -> None:
+    def add(self, step: int, position: Any, velocity: Any, problem: Any, guess: Any) -> None:
         """Keep a state as the problem of number `looked`."""
         self.number.append(self.looked)
         self.step.append(step)
@@ -55,6 +56,7 @@ class Recorded:
         self.digest.append(_digest.digest(problem))
         self.structure.append(_digest.structure(problem))
         self.sketch.append(_digest.sketch(problem))
+        self.guess.append(guess)
 
 
 def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None = None) -> None:
@@ -82,6 +84,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         raise FileExistsError(f"{target}: is there already, and a trajectory is never rewritten")
     from fclib.simulate import (
         StoppedError,
+        carried_to,
         control_of,
         model_of,
         problem_at,
@@ -143,10 +146,13 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
             position = relaxed(model, scheme, position, velocity, way.deepest)
         position = trajectory.rounded(position, exponent)
         velocity = trajectory.rounded(velocity, exponent)
-        problem = problem_at(model, scheme, position, velocity).problem
+        part = problem_at(model, scheme, position, velocity)
+        problem = part.problem
         if problem.nc:
             if plan.chosen is None or kept.looked in plan.chosen:
-                kept.add(step.index, position, velocity, problem)
+                # states of a file do not say which impulses were before them
+                guess = None if way.states else carried_to(model, step.start, part.contacts)
+                kept.add(step.index, position, velocity, problem, guess)
             kept.looked += 1
             if report is not None:
                 report(plan.name, kept.looked, plan.total)
@@ -174,6 +180,8 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
             digest=tuple(kept.digest),
             structure=tuple(kept.structure),
             sketch=np.reshape(kept.sketch, (count, len(_digest.FIELDS), 2)),
+            # of all steps, the one before gives it
+            guess=tuple(kept.guess) if plan.chosen is not None else (),
         ),
     )
     checkpoint.unlink(missing_ok=True)
@@ -207,6 +215,9 @@ def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
         name: np.array(getattr(kept, name)) for name in ("position", "velocity", "sketch")
     }
     arrays |= {f"start_{f.name}": getattr(start, f.name) for f in fields(start)}
+    # one after the other: they are of different lengths
+    arrays["guesses"] = np.array([-1 if one is None else len(one) for one in kept.guess], int)
+    arrays["guess"] = np.concatenate([np.zeros(0), *(one for one in kept.guess if one is not None)])
     content = io.BytesIO()
     np.savez(content, known=json.dumps(known), **arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -224,5 +235,11 @@ def read_checkpoint(path: Path) -> tuple[Recorded, State | None]:
     kept = Recorded(**json.loads(str(values.pop("known"))))
     for name in ("position", "velocity", "sketch"):
         setattr(kept, name, list(values.pop(name)))
+    counts, guess = values.pop("guesses"), values.pop("guess")
+    ends = np.cumsum(np.maximum(counts, 0))
+    kept.guess = [
+        None if n < 0 else guess[end - n : end]
+        for n, end in zip(counts.tolist(), ends.tolist(), strict=True)
+    ]
     state = {name.removeprefix("start_"): value for name, value in values.items()}
     return kept, State(**(state | {"index": int(state["index"])}))

@@ -5,11 +5,13 @@
                     fclib
     /solutions      all known ones, if a problem has several
     /guesses/K      if no solution is known: the best iterate, as the last guess, with the same
-    attributes /fclib_*/info   attribute `solution`: the reason if there is none
+    attributes /fclib_*/info   attribute `solution`: the reason if there is none, always
 
 A solver works to the tolerance asked for. FINISH then goes on from its result, to TARGET. Near a
 solution Newton's methods take a few iterations, and all others take many. If FINISH comes no
 nearer, for example with elastic bodies, `auto` goes on.
+
+`guess_of` makes a guess for the problem of the next step: the impulses of the same contacts.
 """
 
 from __future__ import annotations
@@ -21,8 +23,11 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Final
 
-from fclib import _core, _solve
+import numpy as np
+
+from fclib import _core, _geometry, _solve
 from fclib._judge import MARK, TOLERANCE, Judgement, judge
+from fclib._solve import Given
 from fclib.collections.catalog import PROVEN
 
 # the best that doubles allow for most problems: a product W r is rounded by 1e-14 of its terms
@@ -32,7 +37,11 @@ REACHED: Final = f"{TARGET:g} is reached"
 # machines end at the same solution
 FINISH: Final = (("nsn-jm", 30), ("auto", 3000))
 AUTO: Final = "auto"
+NOT_TRIED: Final = "none was looked for"
 CONVERGED: Final = "converged"  # status of a solution by both maps
+OTHERS: Final = 1000  # largest number of contacts for which other solutions than r = 0 are tried
+SIZES: Final = (1.0, 10.0)  # starts, in reactions that stop one contact alone
+APART: Final = 1e-6  # difference of velocities, over ||q||, from which on solutions are different
 EPOCH: Final = "SOURCE_DATE_EPOCH"  # environment variable: the time stamp for files, in seconds
 
 
@@ -198,11 +207,43 @@ def carried(found: Found, local: Any) -> Found:
     return finished(local, replace(mine, ends="")) if found.ok else mine
 
 
-def best_first(found: Found, problem: Any, several: Sequence[_core.Solution]) -> Found:
+def others(problem: Any, found: Found) -> list[_core.Solution]:
+    """Further solutions of a problem that r = 0 solves, with other velocities; none if it is large.
+
+    `nsn-ac` starts from normal reactions that are large enough to stop all bodies. Other solvers
+    come back to r = 0 from there.
+    """
+    if not found.ok or found.solution.r.any() or problem.nc > OTHERS:
+        return []
+    local = problem.condense() if problem.kind.startswith("global") else problem
+    # tr W / m and ||q|| are those of a contact that stops alone
+    response = float(np.mean(local.W.diagonal())) if problem.nc else 0.0
+    near = APART * float(np.linalg.norm(local.q))
+    own: list[_core.Solution] = []
+    known = [np.asarray(found.solution.u)]
+    for size in SIZES if response > 0 else ():
+        start = np.zeros(problem.spacedim * problem.nc)
+        start[:: problem.spacedim] = size * float(np.abs(local.q).max()) / response
+        multipliers = np.zeros(problem.p) if problem.p else None
+        guess = _core.Solution(r=start, l=multipliers)
+        try:
+            result = _solve.solve(problem, "nsn-ac", TARGET, guess=guess, max_iterations=30)
+        except _core.UnsuitableError:
+            return []
+        u = np.asarray(result.solution.u)
+        # near solutions are one that rounding has moved
+        apart = [np.linalg.norm(u - one) > near for one in known]
+        if all(apart) and judge(problem, result.solution).ok:
+            known.append(u)
+            own.append(_core.Solution(r=result.solution.r, l=result.solution.l))
+    return own
+
+
+def best_first(found: Found, problem: Any, several: Sequence[_core.Solution], by: str) -> Found:
     """One of several known solutions that has reactions, if the solver's own has none."""
     if not several or found.solution.r.any():
         return found
-    own = [given(problem, one, "enumeration") for one in several if one.r.any()]
+    own = [given(problem, one, by) for one in several if one.r.any()]
     return next((one for one in own if one.ok), found)
 
 
@@ -212,6 +253,7 @@ def write(
     found: Found | None,
     guesses: Sequence[_core.Solution] = (),
     several: Sequence[_core.Solution] = (),
+    untried: str = NOT_TRIED,
     **settings: Any,
 ) -> None:
     """Write a problem with the facts known of it.
@@ -222,6 +264,7 @@ def write(
         found: the best known result; None: none was looked for.
         guesses: guesses of other origin.
         several: all known solutions, if there are more than one.
+        untried: why nothing was found, if there is no result.
         settings: settings of `fclib.write`.
     """
     own = list(guesses)
@@ -232,14 +275,12 @@ def write(
     _core.write(path, problem, solution, own, **settings)
     if len(several) > 1:
         _core.write_solutions(path, several)
-    if found is None:
-        return
-    if solution is not None:
+    if solution is not None and found is not None:
         _core.write_attributes(path, "solution", found.attributes)
         return
     if iterate is not None:
-        _core.write_attributes(path, f"guesses/{len(own)}", found.attributes)
-    _core.write_attributes(path, "info", {MARK: why_none(found, len(own))})
+        _core.write_attributes(path, f"guesses/{len(own)}", iterate.attributes)
+    _core.write_attributes(path, "info", {MARK: why_none(found, len(own)) if found else untried})
 
 
 def why_none(found: Found, guess: int) -> str:
@@ -250,3 +291,26 @@ def why_none(found: Found, guess: int) -> str:
         f"none is known: guess {guess} is the best iterate, error {found.error:.1e} by both maps,"
         f" {found.solver}; a solution's is at most {TOLERANCE:g}"
     )
+
+
+def guess_of(before: Any, solution: Given, problem: Any) -> _core.Solution | None:
+    """A guess for one problem from the solution of another, contact by contact.
+
+    A new contact gets no reaction. The multipliers stay if their number is the same. The result is
+    None if one of the two problems does not name its contacts.
+
+    Raises:
+        ValueError: the size of the solution does not fit its problem.
+    """
+    if before.contacts is None or problem.contacts is None or before.spacedim != problem.spacedim:
+        return None
+    solution = _core.solution_from(solution)
+    planar = problem.bodies is not None and problem.bodies.is_planar
+    r = _geometry.carried(
+        before.contacts, problem.contacts, solution.r, problem.spacedim, planar=planar
+    )
+    multipliers = None
+    if problem.p:
+        same = solution.l is not None and len(solution.l) == problem.p
+        multipliers = solution.l if same else np.zeros(problem.p)
+    return _core.Solution(r=r, l=multipliers)

@@ -17,8 +17,8 @@ from typing import Any
 from fclib import _core, _sequence
 from fclib._solve import Given, Problem
 from fclib.collections.catalog import files_of
-from fclib.collections.guesses import guess_of
 from fclib.collections.library import Collection
+from fclib.collections.references import guess_of
 
 
 @dataclass(frozen=True)

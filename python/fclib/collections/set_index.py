@@ -4,11 +4,12 @@ Every family names its set; its problems are SET/FAMILY/NUMBER. Two kinds of set
 problems of others:
 
 extended      all families that are newer than RT-0444
-standard, hard, tiny, rr9118    chosen problems, in folders of their own; data/ has the lists
+standard, hard, tiny, rr9118, fclib2024     chosen problems, in folders of their own; data/ has the
+                                            lists
 
 A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
 stored, its problems never change (`published.py`). A list that has grown notes the version in which
-each problem came.
+each problem came. A list that was replaced stays in data/older.
 """
 
 from __future__ import annotations
@@ -26,11 +27,12 @@ from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, evenly, families, source
 
 DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
+OLDER = "older"  # folder of lists that newer ones have replaced, NAME-VERSION.json
 SHIPPED = ("tiny",)  # sets whose problems need no build
 
 # name, version, description; a set that a family names and that is missing here has version 1
 SETS: dict[str, tuple[str, str]] = {
-    "rt444": ("5", "the four families of RT-0444"),
+    "rt444": ("1", "the four families of RT-0444; two of the scenes in Siconos"),
     "granular": ("7", "grains that fall, flow and are pressed"),
     "rolling": ("6", "grains with rolling friction"),
     "masonry": ("5", "blocks laid without mortar"),
@@ -42,12 +44,17 @@ SETS: dict[str, tuple[str, str]] = {
     "existence": ("3", "without a solution, or with several, and known to be so"),
     "dynamics": ("3", "silo, rope, spinning bodies, friction that differs by contact"),
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
-    "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "machines": ("2", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "quasistatic": ("1", "without inertia: M is a stiffness, of rubber, or of soil that yields"),
+    "laws": ("1", "cohesion, compliance, friction by ellipses, as Coulomb's problem"),
+    "assembly": ("1", "pins in holes, a cable around a drum"),
+    "flows": ("1", "a granular flow of up to 100,000 contacts"),
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
     "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
     "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
+    "fclib2024": ("1", "families in the sizes of the library's sets of 2024"),
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("16", "all families that came after RT-0444"),
+    "extended": ("17", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("9", "what most solvers fail on, of standard and of the later sets"),
     "tiny": ("6", "one problem of each kind; comes with the package"),
@@ -55,6 +62,7 @@ SETS: dict[str, tuple[str, str]] = {
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
     *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "decks", "rr9118"),
+    *("fclib2024", "quasistatic", "laws", "assembly", "flows"),
 )
 
 
@@ -91,7 +99,19 @@ def listed(name: str, version_: str) -> list[Choice]:
         return list(choices(name))
     if not (version_ or "").isdecimal():
         return []
-    return [c for c in choices(name) if c.since and int(c.since) <= int(version_)]
+    # of a list that has grown, the next one tells
+    there = {int(path.stem.rpartition("-")[2]): path for path in older_lists(name)}
+    later = min((one for one in there if one >= int(version_)), default=None)
+    found = choices(name) if later is None else Choice.read(there[later])
+    if later == int(version_):
+        return list(found)
+    return [c for c in found if c.since and int(c.since) <= int(version_)]
+
+
+def older_lists(name: str) -> list[Path]:
+    """The files of the lists that a set had in earlier versions, by another rule."""
+    found = (DATA / OLDER).glob(f"{name}-*.json")
+    return sorted(path for path in found if path.stem.rpartition("-")[2].isdecimal())
 
 
 def kind_of(folder: str) -> str:

@@ -23,6 +23,12 @@ library:
     sketch.bin          (K x 13 x 2) float64, little-endian: two sums of each matrix's entries with
                         signs, in the order of `_digest.FIELDS`; NaN if there is no such matrix
 
+of states without those of the steps before, also what the simulation carried over from these, for
+all states one after the other:
+
+    guess.bin           float32, little-endian: a guess needs no more digits
+    guesses.bin         (K) int32, little-endian: how many numbers each has; -1: not known
+
 of states that another engine handed over (`handed.py`), with C contacts in all, also:
 
     point.bin (C x 3), normal.bin (C x 3), gap.bin (C)      integers of the quantum, as they are
@@ -111,6 +117,9 @@ class Trajectory:
     structure: tuple[str, ...] = ()  # (K) digests of their patterns
     sketch: Vector = field(default_factory=lambda: np.zeros((0, len(_digest.FIELDS), 2)))
     handed: Handed | None = None  # bodies and contacts of another engine that made the states
+    # (K) reactions that the simulation carried over from the step before, as a guess; None of a
+    # state: not known. Empty: the step before is stored too, where there is one
+    guess: tuple[Vector | None, ...] = ()
 
     def __len__(self) -> int:
         return len(self.number)
@@ -184,6 +193,9 @@ class Trajectory:
         state = self.position[place], self.velocity[place]
         part = problem_at(self.model, self.scheme, *state, info)
         contacts, bodies = geometry_of(self.model, part.contacts)
+        start = np.zeros(part.problem.n)  # auxiliary degrees of freedom begin at rest
+        start[: len(part.dofs)] = self.velocity[place][part.dofs]
+        bodies = bodies.started(start, part.problem)
         return replace(part, problem=part.problem.replace(contacts=contacts, bodies=bodies))
 
     def differences(self, place: int, problem: Any) -> dict[str, float]:
@@ -204,6 +216,7 @@ def part(states: Trajectory, numbers: Iterable[int], collection: str, version: s
     values: dict[str, Any] = {name: getattr(states, name)[places] for name in ARRAYS}
     values |= {name: tuple(getattr(states, name)[i] for i in places) for name in HEXES}
     values["handed"] = states.handed.taken(places) if states.handed is not None else None
+    values["guess"] = tuple(states.guess[i] for i in places) if states.guess else ()
     origin = {**states.origin, "collection": collection, "version": version}
     return replace(states, origin=origin, **values)
 
@@ -250,6 +263,11 @@ def write(path: Path, trajectory: Trajectory) -> None:
         values = values.reshape(len(values), math.prod(values.shape[1:]))
         arrays[name], width = packed(values, trajectory.exponent, order)
         shapes[name] = {"shape": list(values.shape), "bytes": width}
+    if trajectory.guess:
+        known = [np.zeros(0) if one is None else one for one in trajectory.guess]
+        counts = [-1 if one is None else len(one) for one in trajectory.guess]
+        arrays["guess"] = np.concatenate(known).astype("<f4").tobytes()
+        arrays["guesses"] = np.array(counts, "<i4").tobytes()
     arrays["number"] = trajectory.number.astype("<i8").tobytes()
     arrays["step"] = trajectory.step.astype("<i8").tobytes()
     for name in ("digest", "structure"):
@@ -344,6 +362,15 @@ def read(path: Path) -> Trajectory:
             own |= {"gap": own["gap"].ravel(), "body": own["body"].reshape(-1, 2)}
             return engines.of(head["handed"], **own)
 
+        def guesses() -> tuple[Vector | None, ...]:
+            if "guesses" not in arrays:
+                return ()
+            values = np.frombuffer(arrays["guess"], "<f4").astype(float)
+            counts = np.frombuffer(arrays["guesses"], "<i4")
+            ends = np.cumsum(np.maximum(counts, 0))
+            rows = zip(counts.tolist(), ends.tolist(), strict=True)
+            return tuple(None if n < 0 else values[end - n : end] for n, end in rows)
+
         def hexes(name: str) -> tuple[str, ...]:
             return tuple(arrays[name][32 * i : 32 * i + 32].hex() for i in range(count))
 
@@ -361,6 +388,7 @@ def read(path: Path) -> Trajectory:
             .astype(float)
             .reshape(count, len(_digest.FIELDS), 2),
             handed=contacts(),
+            guess=guesses(),
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _digest
-from fclib._judge import Judgement, judge
+from fclib._judge import MARK, Judgement, judge
 from fclib.collections import catalog, published, set_index, trajectory
 
 LACKING = ("unfinished", "not listed")  # statuses of entries that a catalogue lacks
@@ -41,10 +41,11 @@ def verify(folder: str | Path, progress: Callable[[str], None] | None = None) ->
     """Hash each file of a folder again, read it, and judge its solutions from the data alone.
 
     A stored solution must be one, by the same judgement as `fclib check`; if there are several,
-    each must be one. The data of the form that the catalogue describes must have the digest in the
-    catalogue. A problem that has the name and version of a published one must be that one, up to
-    rounding on another machine (ROUNDING). Entries that the catalogue lacks come last: families
-    whose build was cut, and files without a row.
+    each must be one. A file without one must say why. So no file is ok that `check` refuses. The
+    data of the form that the catalogue describes must have the digest in the catalogue. A problem
+    that has the name and version of a published one must be that one, up to rounding on another
+    machine (ROUNDING). Entries that the catalogue lacks come last: families whose build was cut,
+    and files without a row.
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -96,6 +97,9 @@ def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, A
             expected = row["solver"] is not None
         if expected:
             return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
+        if MARK not in _core.read_attributes(file, "info"):
+            message = f"{file}: has no solution, and does not say why; build it anew"
+            return Verdict(name, path, "no solution", None, message)
         return Verdict(name, path, "ok", None, "", origin, apart)
     try:
         judgement = judge(problem, solution)

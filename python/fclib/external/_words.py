@@ -1,3 +1,3 @@
 """Texts that several adapters use."""
 
-RELAXATION = "does not solve Coulomb's law, but where nothing slides"
+RELAXATION = "does not solve Coulomb's law, except if nothing slides"

@@ -24,7 +24,7 @@ from fclib._origin import origin_of
 CRITERIA: Final = {
     "error": "the larger of both natural maps, as fclib check prints it",
     "penetration": "how fast contacts close: largest -u_N, over V",
-    "tension": "how contacts pull: sum of -r_N where it is negative, over the sum of |r_N|",
+    "tension": "how contacts pull: sum of -r_N if it is negative, over the sum of |r_N|",
     "distance": "what acts at contacts that open: sum of r_N u_N, over V times the sum of |r|",
     "cone": "friction that is too large: sum of ||r_T|| - mu r_N, over the sum of mu |r_N|",
     "dissipation": "power of friction that is missing: sum of r_T . u_T + mu r_N ||u_T||, over V"
@@ -141,7 +141,7 @@ def judge(paths: Sequence[Path], *, tolerance: float = 1e-8) -> Iterator[Judgeme
 
 
 def time_of(origin: Mapping[str, Any], path: Path) -> float:
-    """The time of a step [s]; the number of its file counts where the engine tells no time."""
+    """The time of a step [s]; if the engine tells none, the number of its file."""
     told, h = (origin.get(name) for name in ("time", "time_step"))
     number = re.search(r"\d+$", path.stem)
     if not told and isinstance(h, (int, float)) and number:

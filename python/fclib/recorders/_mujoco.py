@@ -130,7 +130,7 @@ def record(mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None]) -> 
         velocity=np.array(data.qvel),
         contacts=contacts,
         notes=(
-            "w is gap / h where a contact or limit is open, and 0 where it is closed: no"
+            "w is gap / h if a contact or limit is open, and 0 if it is closed: no"
             " penetration is corrected. Joints are rigid.",
             *notes,
         ),

@@ -131,7 +131,7 @@ def record(
         velocity=velocity,
         contacts=contacts,
         notes=(
-            "w is gap / h where a contact is open, and 0 where it is closed: no penetration is"
+            "w is gap / h if a contact is open, and 0 if it is closed: no penetration is"
             " corrected. Damping of velocities is left out.",
         ),
     )

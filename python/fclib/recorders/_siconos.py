@@ -163,7 +163,7 @@ def told(file: Path) -> Told:
     h, rows = float(known["h"]), known["points"]
     number = known["positions"][:, 0].astype(int)
     order = np.argsort(number)
-    # the two numbers are equal where the other side is fixed
+    # the two numbers are equal if the other side is fixed
     second, first = (
         order[np.searchsorted(number[order], rows[:, k].astype(int))] for k in (23, 24)
     )

@@ -107,6 +107,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("existence", "existence", "of a solution, and by what it is proved"),
     ("uniqueness", "uniqueness", "of the velocity"),
     ("same_as", "same as", "the first problem with the same data"),
+    ("trivial", "trivial", "why r = 0 solves it"),
     (
         "best_solver",
         "best solver",
@@ -440,7 +441,7 @@ class _Writer:
         site["views"] = views
         site["ratings"] = _records_of_classes(self.problems, self.campaigns)
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
-        site["problems"] = len(self.problems.rows)
+        site |= _numbers(self.problems.rows)
         site["recipes"] = recipes(sorted(formulations))
         site["files"] = self.downloads.kind
         site["module"] = browser.copy(self.module, self.folder) if self.module else 0
@@ -578,7 +579,7 @@ class _Writer:
         found = []
         for (collection, name), places in sorted(groups.items()):
             rows = [self.problems.rows[k] for k in places]
-            record: dict[str, Any] = {"name": name, "set": collection, "problems": len(rows)}
+            record: dict[str, Any] = {"name": name, "set": collection, **_numbers(rows)}
             record["ranges"] = {
                 key: [min(values), max(values)]
                 for key in ("nc", "n", "density", "mu_max")
@@ -625,6 +626,12 @@ def _histograms(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             record = {"key": key, "integer": is_whole(values)}
             found.append(record | {"edges": rounded(edges, DIGITS), "counts": counts.tolist()})
     return found
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """How many different problems there are, and how many copies of these or of others."""
+    copies = sum(bool(row.get("same_as")) for row in rows)
+    return {"problems": len(rows) - copies, "copies": copies}
 
 
 def _records_of_classes(problems: Problems, campaigns: Campaigns | None) -> list[dict[str, Any]]:

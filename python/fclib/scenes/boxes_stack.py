@@ -20,7 +20,9 @@ class BoxesStack:
 
     After the family BoxesStack of V. Acary, M. Bremond, T. Koziara and F. Perignon, FCLIB: a
     collection of discrete 3D Frictional Contact problems, Inria report RT-0444, 2014. Sizes,
-    masses and friction are its own; the gaps, offsets and rotations are chosen here.
+    masses and friction are its own; the gaps, offsets and rotations are chosen here. The stored
+    problems of `rt444` are not of this scene but of the authors' own, which Siconos stepped: the
+    boxes start far above each other, and drop one upon another.
     """
 
     title: ClassVar[str] = "Stack of boxes"

@@ -22,6 +22,8 @@ class Capsules:
     After the family Capsules of V. Acary, M. Bremond, T. Koziara and F. Perignon, FCLIB: a
     collection of discrete 3D Frictional Contact problems, Inria report RT-0444, 2014. Number,
     sizes, masses and friction are its own; the box and the positions at the start are chosen here.
+    The stored problems of `rt444` are not of this scene but of the authors' own, which Siconos
+    stepped: the capsules start above each other, and drop into the middle of a wide box.
     """
 
     title: ClassVar[str] = "Capsules in a box"

@@ -23,7 +23,8 @@ class KaplasTower:
     After the family KaplasTower of V. Acary, M. Bremond, T. Koziara and F. Perignon, FCLIB: a
     collection of discrete 3D Frictional Contact problems, Inria report RT-0444, 2014. Sizes,
     masses, friction and the number of levels are its own; the clearance between the planks of a
-    ring and the gaps below the levels are chosen here.
+    ring and the gaps below the levels are chosen here. The stored problems of `rt444` are not of
+    this scene but of the authors' own, which Siconos stepped: planks stand on edge, and drop.
     """
 
     title: ClassVar[str] = "Tower of kaplas"

@@ -49,6 +49,9 @@ class PrimitiveSoup:
     restitution: float = parameter(0.0, "1", "0: the law of gaps is inelastic")
     width: float = parameter(8.5, "m", "inner edge of the box, a square")
     gyroscopic: bool = parameter(False, "1", "whether M has the derivative of gyroscopic terms")
+    all_bodies: bool = parameter(
+        False, "1", "whether bodies that touch nothing are in the problems too"
+    )
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.0125, "s", "time step h")
 

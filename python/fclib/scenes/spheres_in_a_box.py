@@ -19,7 +19,9 @@ class SpheresInABox:
     As many as the box's section holds lie in a layer of the start, the layers a little apart. The
     packing is disordered, and its masses differ by (1 - spread)^-3.
 
-    Spheres in a box are a set of the FCLIB library; all figures are chosen here.
+    Or fewer lie in a layer: a column that falls, and spreads in the box. So begin the sets Spheres
+    and Spheres_1mm of the FCLIB library, 2000 equal spheres, which have these figures in the set
+    `fclib2024`. The figures below are chosen here.
     """
 
     title: ClassVar[str] = "Spheres in a box"
@@ -39,6 +41,14 @@ class SpheresInABox:
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
     width: float = parameter(10.6, "m", "inner edge of the box, a square")
     gap: float = parameter(0.1, "m", "clearance of two places of the grid at the start")
+    across: int = parameter(
+        0, "1", "places of a layer along x and along y at the start; 0: as many as the box holds"
+    )
+    lift: float = parameter(0.0, "m", "height of the lowest layer's places at the start")
+    offset: float = parameter(0.0, "m", "further room of a sphere in its place, at most gap / 2")
+    all_bodies: bool = parameter(
+        False, "1", "whether spheres that touch nothing are in the problems too"
+    )
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.0125, "s", "time step h")
 
@@ -46,11 +56,20 @@ class SpheresInABox:
         mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
-            non_negative=("mu", "spread", "gap"),
-            at_least={"spheres": 1, "width": 2 * self.radius + self.gap},
+            non_negative=("mu", "spread", "gap", "lift", "offset"),
+            at_least={
+                "spheres": 1,
+                "across": 0,
+                "width": max(1, self.across) * (2 * self.radius + self.gap),
+            },
         )
         if not self.spread < 1:
             raise ValueError(f"SpheresInABox: spread must be < 1, not {self.spread}")
+        if not self.offset <= 0.5 * self.gap:
+            raise ValueError(
+                f"SpheresInABox: offset must be at most gap / 2 = {0.5 * self.gap:g}, not"
+                f" {self.offset}"
+            )
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the radii, and the places in their cells."""
@@ -59,15 +78,16 @@ class SpheresInABox:
         draws = random.uniform(size=(self.spheres, 4))
         radii = self.radius * (1 - self.spread * draws[:, 0])
         pitch = 2 * self.radius + self.gap
-        side = math.floor(self.width / pitch)
+        side = self.across or math.floor(self.width / pitch)
         friction = mjcf.surface(self.mu)
         bodies = mjcf.walls(0.5 * self.width, self.width, self.mu)
         for i, radius in enumerate(radii.tolist()):
             layer, cell = divmod(i, side * side)
             # somewhere in the cell, without touching its faces
-            room = self.radius - radius
+            room = self.radius - radius + self.offset
             x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
-            place = np.array([x, y, pitch * (layer + 0.5)]) + room * (2 * draws[i, 1:] - 1)
+            z = self.lift + pitch * (layer + 0.5)
+            place = np.array([x, y, z]) + room * (2 * draws[i, 1:] - 1)
             bodies.append(mjcf.sphere(i, self.spheres, place, radius, self.density, friction))
         return Scene.of(
             self,

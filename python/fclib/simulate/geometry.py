@@ -89,6 +89,10 @@ def rigid(model: MujocoModel, contacts: moreau_jean.Contacts) -> tuple[Contacts,
         **static.columns,
         place=rounded(d.xpos[static.bodies]),
         turn=rounded(d.xquat[static.bodies]),
+        mass=m.body_mass[static.bodies],
+        inertia=m.body_inertia[static.bodies],
+        center=m.body_ipos[static.bodies],
+        axes=m.body_iquat[static.bodies],
     )
     limit = contacts.pair[:, 0] < 0
     geom = np.where(limit[:, None], 0, contacts.pair)

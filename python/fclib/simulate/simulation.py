@@ -341,10 +341,17 @@ def contradiction(model: Model, system: System) -> str:
     involved = kept[shares > RANK * shares.max(initial=0.0)]
     words = sorted({names[k] for k in (others[worst], *involved)})
     return (
-        f"the equalities {', '.join(words)} contradict each other: where the others hold one is off"
+        f"the equalities {', '.join(words)} contradict each other: if the others hold, one is off"
         f" by {gaps[worst]:.2g} m or rad, and equalities are rigid here, not soft as in MuJoCo;"
         ' leave one of them out (active="false" in the MJCF)'
     )
+
+
+def carried_to(model: Model, start: State, contacts: Contacts) -> Vector:
+    """The guess (d nc) that a step has from the one before, for contacts of the model as it is."""
+    if not len(start.r):
+        return np.zeros(contacts.dimension * len(contacts))
+    return carry_over(start, contacts, places_of(model, contacts))
 
 
 def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:

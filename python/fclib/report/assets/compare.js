@@ -4,7 +4,7 @@
 // by the same names, and tests/python/test_report_numbers.py compares them on every choice.
 "use strict";
 (() => {
-  /* what a solver has on an instance: its cost, Infinity where it failed, NaN where there is no
+  /* what a solver has on an instance: its cost, Infinity if it failed, NaN if there is no
      cell */
   const cell = (bench, costs, s, i) =>
     bench.absent.includes(bench.statuses[s][i]) ? NaN : (costs[s][i] ?? Infinity);

@@ -4,7 +4,7 @@
 (() => {
   const { h, number, copyable } = Fclib;
   const MODULE = "assets/browser/fclib-worker.js";
-  const LIMIT = 30; // [s] of a solve, where nothing else is said
+  const LIMIT = 30; // [s] of a solve, if nothing else is given
   const GRACE = 5; // [s] after which a solver that did not look at its limit is ended
   const SAME = 1e-12;
   const MOST = 1000; // points of the curve
@@ -140,7 +140,7 @@
     };
   };
 
-  /* the options of a solver as fields: their values where they are not the defaults */
+  /* the options of a solver as fields: their values if they are not the defaults */
   const optionsOf = ({ name, options }) => {
     const fields = options.map((option) => {
       const { type, lowest, highest, choices } = option;
@@ -396,7 +396,8 @@
       ],
       ["bound", "what it proves is of reactions of a smaller norm"],
     ];
-    const [said, found] = [statement(stored.bound), here ? statement(here.bound) : "nothing"];
+    const proved = statement(stored.bound);
+    const proves = here ? statement(here.bound) : "nothing";
     return Fclib.table({
       caption: "The stored certificate: what it proved when it was stored, and what it proves here",
       page: 60,
@@ -404,9 +405,9 @@
         {
           name: "proves",
           doc: "",
-          stored: said,
-          here: found,
-          same: said === found ? "the same" : "differs",
+          stored: proved,
+          here: proves,
+          same: proved === proves ? "the same" : "differs",
         },
         ...parts
           .filter(([name]) => Number.isFinite(stored[name]))
@@ -437,9 +438,9 @@
   /* check, solve and change a problem: buttons, and what they bring
      source(): {read() -> {problem, solution}, merit: as stored, view: as drawn, name}; it is asked
      at each press
-     proven: {read(), proof: as stored}, where a run has proven that there is no solution */
+     proven: {read(), proof: as stored}, if a run has proven that there is no solution */
   Fclib.panel = (source, more, proven) => {
-    const said = h("p", { class: "small", role: "status" });
+    const statusLine = h("p", { class: "small", role: "status" });
     const merits = h("div", {});
     const proofs = h("div", {});
     const seen = h("div", {});
@@ -448,14 +449,14 @@
     let figure = null;
     const attempt = async (button, text, act) => {
       button.disabled = true;
-      said.className = "small";
-      said.textContent = text;
+      statusLine.className = "small";
+      statusLine.textContent = text;
       try {
         await act();
-        said.textContent = "";
+        statusLine.textContent = "";
       } catch (error) {
-        said.className = "small bad";
-        said.textContent = error.message;
+        statusLine.className = "small bad";
+        statusLine.textContent = error.message;
       }
       button.disabled = false;
     };
@@ -537,8 +538,8 @@
       "Solve it here",
     );
     const say = (text) => {
-      said.className = "small bad";
-      said.textContent = text;
+      statusLine.className = "small bad";
+      statusLine.textContent = text;
     };
     const change = h(
       "button",
@@ -572,7 +573,7 @@
       show: () => live(source()),
       elements: [
         h("div", { class: "controls" }, more, check, certificate, solve, change),
-        said,
+        statusLine,
         merits,
         proofs,
         changed,
@@ -598,7 +599,7 @@
     ];
   };
 
-  /* the panel of a problem whose files the site has, where it has the module too */
+  /* the panel of a problem whose files the site has, if it has the module too */
   Fclib.computeIt = (record, view, name, runs) => {
     const files = (record.files || []).filter(
       (one) => one.path.endsWith(".hdf5") && (one.href || "").startsWith("files/"),

@@ -58,7 +58,7 @@ Fclib.set = (element, attributes) => {
   }
 };
 
-// names and what they are, where it is known
+// names and what they are, if it is known
 Fclib.facts = (pairs, kind = "facts") =>
   Fclib.h(
     "dl",
@@ -165,6 +165,10 @@ Fclib.tolerance = (tol) =>
   Number.isFinite(tol) ? tol.toExponential().replace("e+", "e") : Fclib.number(null);
 // "1 family", "2 families"
 Fclib.count = (number, one, many = `${one}s`) => `${number} ${number === 1 ? one : many}`;
+
+/* different problems; those with the data of another one are told apart */
+Fclib.problems = ({ problems, copies }) =>
+  Fclib.count(problems, "problem") + (copies ? ` and ${Fclib.count(copies, "copy", "copies")}` : "");
 
 // ---- light and dark: the system's choice until a person makes another
 Fclib.theme = {

@@ -30,7 +30,7 @@
     return stored;
   };
   const problemHref = (id) => to("problem", id.split("/"));
-  // where there is little room, a name breaks after a part of it
+  // if there is little room, a name breaks after a part of it
   const problemLink = (id) =>
     h(
       "a",

@@ -405,7 +405,7 @@
     });
   };
 
-  /* options: points [{x, y, problem, group}] null where a solver failed, groups, range, xlabel,
+  /* options: points [{x, y, problem, group}] null if a solver failed, groups, range, xlabel,
      ylabel, xname, yname, to(problem) */
   Fclib.scatter = (options) => {
     const [low, high] = options.range;
@@ -576,7 +576,7 @@
         .map((text) => h("p", { class: "small words" }, text)),
     );
 
-  /* the patterns of matrices: a cell is darker where more of its entries are not zero */
+  /* the patterns of matrices: a cell is darker if more of its entries are not zero */
   Fclib.patterns = (list) =>
     h(
       "div",

@@ -100,7 +100,7 @@
     if (!all.length) all.push([0, 0, 0], [1, 1, 1]);
     const [low, high] = reach(all);
     const radius = Math.max(1e-12, length(plus(high, low, -1)) / 2);
-    // of the cell: about the origin where the file says it, else where the recovered bodies are
+    // of the cell: about the origin if the file says it, else where the recovered bodies are
     const cell =
       solids && solids.period
         ? [solids.period.map((p) => -p / 2), solids.period.map((p) => p / 2)]
@@ -763,7 +763,7 @@
     let timer = 0;
     let data = null;
     let frame = 0;
-    const said = h("span", { class: "small" });
+    const position = h("span", { class: "small" });
     const slider = h("input", {
       type: "range",
       min: 0,
@@ -781,7 +781,7 @@
           ? null
           : { at: data.at, place: data.place[k], turn: data.turn[k], reach: data.reach },
       );
-      said.replaceChildren(
+      position.replaceChildren(
         problem === sequence.number
           ? `problem ${problem}, this one, ${k + 1} of ${data.numbers.length}`
           : h(
@@ -836,7 +836,7 @@
       await ready();
       slider.value = frame;
     });
-    box.append(h("span", { class: "small soft" }, "the sequence"), play, slider, said);
+    box.append(h("span", { class: "small soft" }, "the sequence"), play, slider, position);
     slider.max = sequence.count - 1;
     slider.value = Math.max(0, sequence.numbers.indexOf(sequence.number));
   };

@@ -3,13 +3,13 @@
 (() => {
   const { h, number } = Fclib;
   const STATUS = ["open", "stick", "slide"];
-  const TOLERANCE = 1e-8; // of a solution that is followed, where nothing else is said
+  const TOLERANCE = 1e-8; // of a solution that is followed, if nothing else is given
   const LIMIT = 2; // [s] of a solve
   // what a mass or a frame may differ from those of a rigid body; network.py has the same
   const RIGID = 1e-6;
   const WINDOW = 1000; // [ms] over which solves and pictures are counted
 
-  /* N, T1, T2 of each contact in the world, where the problem or the picture says it */
+  /* N, T1, T2 of each contact in the world, if the problem or the picture says it */
   const framesOf = (problem, view) => {
     const { contacts } = problem;
     const network = (view && view.network) || {};
@@ -26,7 +26,7 @@
       ];
     });
   };
-  /* what a live picture is shown: reactions by contact, as forces in space where frames are known
+  /* what a live picture is shown: reactions by contact, as forces in space if frames are known
    */
   Fclib.shower = (problem, view) => {
     const d = problem.spacedim;
@@ -49,7 +49,7 @@
   /* statuses as a picture has them: one digit a contact */
   Fclib.digits = (names) => names.map((name) => STATUS.indexOf(name)).join("");
 
-  /* rows of f that are forces along x, y, z (x, z in a plane), by body; null where the bodies are
+  /* rows of f that are forces along x, y, z (x, z in a plane), by body; null if the bodies are
      not free and rigid */
   const forceRows = async (fclib, problem) => {
     if (!("f" in problem)) return null;
@@ -114,7 +114,7 @@
 
   /* its values are those of the input times `scale`, which keeps nought nought */
   const slider = (label, unit, { min, max, step, value, scale = 1 }, act) => {
-    const said = h("output", {});
+    const shown = h("output", {});
     const input = h("input", {
       type: "range",
       min,
@@ -128,11 +128,11 @@
       },
     });
     const tell = () => {
-      said.textContent = `${label} ${number(scale * Number(input.value))}${unit && ` ${unit}`}`;
+      shown.textContent = `${label} ${number(scale * Number(input.value))}${unit && ` ${unit}`}`;
     };
     tell();
     return {
-      element: h("div", { class: "range" }, said, input),
+      element: h("div", { class: "range" }, shown, input),
       put: (v) => {
         input.value = v / scale;
         tell();

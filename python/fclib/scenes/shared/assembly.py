@@ -9,6 +9,7 @@ from __future__ import annotations
 import decimal
 import functools
 import json
+import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -48,6 +49,11 @@ def exponentials(x: Vector) -> Vector:
         return np.array([float(decimal.Decimal(value).exp()) for value in x.tolist()])
 
 
+def total(x: Vector) -> float:
+    """The sum of numbers, exactly rounded: that of NumPy depends on the processor."""
+    return math.fsum(x.tolist())
+
+
 def as_published(name: str, exact: Vector) -> Vector:
     """The same numbers; some get the last digit that was published under this name."""
     found = exact.copy()
@@ -61,6 +67,15 @@ def _last_digits() -> dict[str, dict[str, list[int]]]:
     """By FAMILY/SIZE: places of numbers that are one unit in the last place below, or above."""
     text = Path(__file__).with_name("last_digits.json").read_text(encoding="utf-8")
     return dict(json.loads(text))
+
+
+def told(info: _core.ProblemInfo, facts: dict[str, Any], word: str = "") -> _core.ProblemInfo:
+    """The info of a problem with facts of its own, and a further word on its mathematics."""
+    return _core.ProblemInfo(
+        title=info.title,
+        description=json.dumps(facts),
+        math_info="; ".join(part for part in (info.math_info, word) if part),
+    )
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
 from fclib._regular import regular
-from fclib.scenes.shared import siconos_input
+from fclib.scenes.shared import siconos_input, siconos_scene
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
 
@@ -115,14 +115,14 @@ class Scene:
         ground: float | None = None,
         friction: float | None = None,
     ) -> Scene:
-        """The scene of an MJCF file, a URDF file or an input.dat of Siconos.
+        """The scene of an MJCF file, a URDF file, or of Siconos: an input.dat or mechanics' HDF5.
 
         Its parameters hold the SHA-256 of the file and of all files to which it refers.
 
         Args:
             path: path of the file.
-            time_step: h [s]; None: that of the file.
-            restitution: Newton's coefficient e.
+            time_step: h [s]; None: that of the file. Siconos' files do not have it.
+            restitution: Newton's coefficient e, of files that do not have it.
             law: the unilateral law.
             planar: whether it moves in the plane x, z.
             keyframe: name of the keyframe of its start; None: start, home or stand, if there is
@@ -132,20 +132,22 @@ class Scene:
             activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
             floating: whether the root of a URDF file moves freely; else it is welded to the world.
             ground: coefficient of friction of a plane below all at the start; None: no plane.
-            friction: that of all bodies of an input.dat, which does not have it, nor a time step.
+            friction: that of all bodies of an input.dat, which does not have it.
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: a package is not known, or nothing can float; or an input.dat is wrong, or
-                lacks its time step or friction.
-            ImportError: it refers to files, and MuJoCo is missing.
+            ValueError: a package is not known, or nothing can float; or a file of Siconos is wrong,
+                or lacks its time step or friction.
+            ImportError: it refers to files, and MuJoCo is missing; or h5py is, for a file of HDF5.
         """
-        path = Path(path)
+        path = regular(path)
         if path.suffix == siconos_input.SUFFIX:
             return cls._of_siconos(path, time_step, friction, restitution, law, activation)
         if friction is not None:
             raise ValueError(f"{path.name} has its own friction; friction= is for an input.dat")
-        xml = regular(path).read_text(encoding="utf-8")
+        if siconos_scene.is_one(path):
+            return cls._of_mechanics(path, time_step, restitution, law, activation)
+        xml = path.read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
         resolved = resolve_packages(path.name, xml, packages or {})
         files, includes = references_of(path, resolved)
@@ -211,6 +213,33 @@ class Scene:
             },
             title=folder.name,
             description=f"Problems of the scene {folder.name}/{path.name} of Siconos.",
+        )
+
+    @classmethod
+    def _of_mechanics(
+        cls,
+        path: Path,
+        time_step: float | None,
+        restitution: float,
+        law: Law,
+        activation: float,
+    ) -> Scene:
+        """The scene of a file of Siconos' mechanics."""
+        if time_step is None:
+            raise ValueError(f"{path}: does not have the time step, which must be given")
+        if restitution:
+            raise ValueError(f"{path}: has its own restitution; restitution= is for other files")
+        found = siconos_scene.read(path, time_step, siconos_input.GRAVITY)
+        return cls(
+            name=path.stem,
+            xml=found.xml,
+            time_step=time_step,
+            restitution=found.restitution,
+            law=law,
+            activation=activation,
+            parameters={"file": path.name, "sha256": digest_of(path)},
+            title=path.stem,
+            description=f"Problems of the scene {path.name} of Siconos' mechanics.",
         )
 
 

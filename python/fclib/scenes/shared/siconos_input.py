@@ -104,7 +104,7 @@ def files_of(path: Path) -> list[Path]:
 
 def lines(path: Path) -> list[tuple[int, list[str]]]:
     """The lines of a file that are not empty, with their numbers from 1 on, in words."""
-    text = regular(path).read_text(encoding="utf-8").splitlines()
+    text = path.read_text(encoding="utf-8").splitlines()
     return [(number, line.split()) for number, line in enumerate(text, 1) if line.strip()]
 
 
@@ -138,7 +138,11 @@ def shape_of(path: Path, number: int, words: list[str], name: str) -> str:
             f"{where}: the shape {kind!r} is not taken; it may be a .vtp file or"
             f" {', '.join(PRIMITIVES)}"
         )
-    sizes = numbers_of(words[1:], where)
+    return primitive_of(kind, numbers_of(words[1:], where), where, name)
+
+
+def primitive_of(kind: str, sizes: list[float], where: str, name: str) -> str:
+    """The attributes of one of the PRIMITIVES; on a second line the mesh that it needs."""
     if len(sizes) != PRIMITIVES[kind] or not min(sizes) > 0:
         raise ValueError(f"{where}: {kind} has {PRIMITIVES[kind]} positive numbers")
     if kind == "Sphere":
@@ -150,39 +154,57 @@ def shape_of(path: Path, number: int, words: list[str], name: str) -> str:
 
 
 def mesh_of(path: Path, where: str, name: str) -> str:
-    """A convex shape of a .vtp file."""
-    from scipy.spatial import ConvexHull, QhullError
-
+    """A convex shape of a .vtp file, with its centre of mass at its origin."""
     if not path.is_file():
         raise ValueError(f"{where}: the shape {path} is not there")
-    points = np.unique(points_of(path), axis=0)
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
-        raise ValueError(f"{where}: {path} has no volume") from None
+    points = points_of(path)
+    text = convex_mesh(points, f"{where}: {path}", name)
     size = float(np.abs(points).max())
-    depth = -(hull.equations[:, :3] @ points.T + hull.equations[:, 3:]).max(axis=0)
-    if depth.max() > ROUNDING * size:
-        raise ValueError(
-            f"{where}: {path} is not convex: a vertex lies {depth.max():g} m inside its hull"
-        )
-    inside = points.mean(axis=0)
-    edges = points[hull.simplices] - inside
-    volumes = np.abs(np.linalg.det(edges))
-    centre = inside + volumes @ edges.sum(axis=1) / 4 / volumes.sum()
+    centre = centre_of(points)
     if np.abs(centre).max() > ROUNDING * size:
         raise ValueError(
             f"{where}: the centre of mass of {path} is {np.linalg.norm(centre):g} m from its"
             " origin, where Siconos puts it"
         )
+    return text
+
+
+def convex_mesh(points: Vector, what: str, name: str) -> str:
+    """The mesh of the points of a convex shape. ValueError: it is not convex, or has no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.unique(points, axis=0)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        raise ValueError(f"{what} has no volume") from None
+    depth = -(hull.equations[:, :3] @ points.T + hull.equations[:, 3:]).max(axis=0)
+    if depth.max() > ROUNDING * float(np.abs(points).max()):
+        raise ValueError(f"{what} is not convex: a vertex lies {depth.max():g} m inside its hull")
     corners = "  ".join(mjcf.numbers(*point) for point in points)
     return f'<mesh name="{name}" vertex="{corners}"/>'
 
 
+def centre_of(points: Vector) -> Vector:
+    """The centre of mass of the hull of points."""
+    from scipy.spatial import ConvexHull
+
+    inside = points.mean(axis=0)
+    edges = points[ConvexHull(points).simplices] - inside
+    volumes = np.abs(np.linalg.det(edges))
+    centre: Vector = inside + volumes @ edges.sum(axis=1) / 4 / volumes.sum()
+    return centre
+
+
 def points_of(path: Path) -> Vector:
-    """(k x 3) the points of a .vtp file: as text, or binary, compressed by zlib or not."""
+    """(k x 3) the points of a .vtp file. OSError, ValueError."""
+    return points_in(regular(path).read_bytes(), str(path))
+
+
+def points_in(text: bytes, what: str) -> Vector:
+    """(k x 3) the points in VTK's XML: as text, or binary, compressed by zlib or not."""
     try:
-        root = ElementTree.fromstring(regular(path).read_bytes())
+        root = ElementTree.fromstring(text)
         array = root.find("PolyData/Piece/Points/DataArray")
         if array is None:
             raise ValueError("it has no points")
@@ -190,20 +212,20 @@ def points_of(path: Path) -> Vector:
             values = np.array((array.text or "").split(), dtype=float)
         else:
             appended = root.find("AppendedData")
-            text = (array.text or "").strip()
+            coded = (array.text or "").strip()
             if array.get("format") == "appended":
                 if appended is None or appended.get("encoding") != "base64":
                     raise ValueError("its data are not in base64")
                 start = int(array.get("offset", "0"))
-                text = (appended.text or "").strip().removeprefix("_")[start:]
+                coded = (appended.text or "").strip().removeprefix("_")[start:]
             header = TYPES[root.get("header_type", "UInt32")]
-            data = decoded(text, header, "compressor" in root.attrib)
+            data = decoded(coded, header, "compressor" in root.attrib)
             values = np.frombuffer(data, TYPES[array.get("type", "")]).astype(float)
         points: Vector = values.reshape(-1, 3)
     except (ElementTree.ParseError, KeyError, ValueError, zlib.error) as error:
-        raise ValueError(f"{path}: is no .vtp file that is read here: {error}") from None
+        raise ValueError(f"{what}: is no .vtp file that is read here: {error}") from None
     if not np.isfinite(points).all():
-        raise ValueError(f"{path}: has a point that is not finite")
+        raise ValueError(f"{what}: has a point that is not finite")
     return points
 
 

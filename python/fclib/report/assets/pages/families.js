@@ -25,7 +25,7 @@
             "p",
             { class: "small soft" },
             [
-              Fclib.count(f.problems, "problem"),
+              Fclib.problems(f),
               f.ranges.nc &&
                 `${range(f.ranges.nc)} ${f.ranges.nc[1] === 1 ? "contact" : "contacts"}`,
               ...f.formulations,
@@ -58,14 +58,14 @@
   ];
 
   Fclib.pages.families = async (page) => {
-    const { families: all, problems } = site();
+    const { families: all } = site();
     const sets = [...new Set(all.map((f) => f.set))];
     page.append(
       h("h1", {}, "Families"),
       h(
         "p",
         {},
-        `${Fclib.count(problems, "problem")} in ${Fclib.count(all.length, "family", "families")}` +
+        `${Fclib.problems(site())} in ${Fclib.count(all.length, "family", "families")}` +
           `${sets.length > 1 ? ` of ${sets.length} sets` : ""}.`,
       ),
       ...sets
@@ -100,7 +100,7 @@
           (f.text || []).map((text) => h("p", { class: "small" }, prose(text))),
           facts([
             ["name", f.set ? `${f.set}/${f.name}` : f.name],
-            ["problems", link("catalogue", [], { family: f.name }, String(f.problems))],
+            ["problems", link("catalogue", [], { family: f.name }, Fclib.problems(f))],
             ["application", f.application],
             ["friction", f.friction],
             ["original by", f.authors],

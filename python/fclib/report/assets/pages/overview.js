@@ -230,7 +230,7 @@
     const o = s.overview;
     const counts = [
       o && Fclib.count(s.solvers.length, "solver"),
-      Fclib.count(s.problems, "problem"),
+      Fclib.problems(s),
       Fclib.count(s.families.length, "family", "families"),
       o && `${Fclib.count(o.runs, "run")}, ${Fclib.percent(o.share)} of them solved`,
     ].filter(Boolean);

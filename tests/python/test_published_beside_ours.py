@@ -1,4 +1,4 @@
-"""The published files beside a built collection, and the figures of RT-0444, by one command."""
+"""Published sets beside a built collection, and the figures of RT-0444, by one command."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import pytest
 import fclib
 from fclib import collections
 from fclib.collections.plan import Plan
-from workshop.sets import published_distributions as script
+from workshop.tables import published_beside_ours as script
 
 pytest.importorskip("pyarrow")
-PUBLISHED = "Local/siconos/BoxesStack"
+FILES = "Local/siconos/BoxesStack"  # as the list of files names the set
+PUBLISHED = "BoxesStack"
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def listed(path: Path, rows: list[tuple[str, object, object, object]]) -> Path:
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> None:
-    monkeypatch.setattr(sys, "argv", ["published_distributions.py", *map(str, arguments)])
+    monkeypatch.setattr(sys, "argv", ["published_beside_ours.py", *map(str, arguments)])
     script.main()
 
 
@@ -54,11 +55,19 @@ def test_ours_stand_under_the_published_files(
     pytest.importorskip("matplotlib")
     files = listed(
         tmp_path / "files.csv",
-        [(PUBLISHED, k, "", 4 * k) for k in range(1, 12)] + [("Local/other", 7, 6, "")],
+        [(FILES, k, "", 4 * k) for k in range(1, 12)] + [("Local/other", 7, 6, "")],
     )
     run(monkeypatch, built, "--files", files, "--sample", 2, "--pictures", tmp_path / "out")
     rows = cells(capsys.readouterr().out)
-    table = {(row[0], row[1]): row[2:] for row in rows[2:]}
+    second = [row[:2] for row in rows].index(["set", "of"])
+    # the figures of the set, and ours under them; then sets that nothing of ours is beside
+    shown = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[2:second]}
+    assert list(shown)[list(shown).index(f"*{PUBLISHED}*") + 1] == "rt444/BoxesStack"
+    assert shown[f"*{PUBLISHED}*"]["dof"] == "6 to 300"
+    assert shown["rt444/BoxesStack"]["problems"] == "5"
+    assert "contacts" in shown["rt444/BoxesStack"]["within"]
+    assert "*Spheres*" in shown
+    table = {(row[0], row[1]): row[2:] for row in rows[second + 2 :]}
     # least, 10 %, a quarter, median, three quarters, 90 %, largest
     theirs = ["11", "1", "2", "3", "6", "9", "10", "11"]
     assert table[f"*{PUBLISHED}*", "sweeps"][0] == "11"
@@ -80,9 +89,7 @@ def test_ours_stand_under_the_published_files(
         ("*Local/other*", "sweeps"),
     ]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == [
-        f"{PUBLISHED.replace('/', '-')}-{label}.png" for label in ("contacts", "sweeps")
-    ]
+    assert names == [f"{PUBLISHED}-{label}.png" for label in ("contacts", "sweeps")]
 
 
 def test_a_list_without_the_columns_is_named(

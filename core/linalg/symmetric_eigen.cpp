@@ -1,4 +1,4 @@
-#include "linalg/spectral_norm.hpp"
+#include "linalg/symmetric_eigen.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -10,6 +10,11 @@ double spectral_norm(const Eigen::MatrixXd& a) {
       .eigenvalues()
       .cwiseAbs()
       .maxCoeff();
+}
+
+Eigenpairs eigenpairs(const Eigen::MatrixXd& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
+  return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
 }  // namespace fclib

@@ -1,18 +1,24 @@
-"""Contacts, degrees of freedom and sweeps of a built collection beside the published files.
+"""Published sets beside ours: their figures, and whole distributions, by one command.
 
-    .venv/bin/python -m workshop.sets.published_distributions FOLDER... --files FILES.csv
-        [--sample 40] [--most 200000] [--seconds 20] [--pictures OUT] [--results NAME]
-    .venv/bin/python -m workshop.sets.published_distributions FOLDER... --report OUT
+    .venv/bin/python -m workshop.tables.published_beside_ours FOLDER... [--files FILES.csv]
+        [--sample 32] [--limit 1900] [--most 200000] [--seconds 20] [--pictures OUT]
+        [--results NAME]
+    .venv/bin/python -m workshop.tables.published_beside_ours FOLDER... --report OUT
+
+The first table has the ends of sizes, density, rank ratio and conditioning of each published set
+(workshop/sets/published_sets.csv), and of ours under it; collection_table.py says how they are
+found. The last column says whether ours has the published range.
 
 FILES.csv lists the files of the published library: set, file, nsgs_sweeps, dof, contacts, as their
-names tell these; it is no part of this project. The table has the quantiles of each, and of ours
-under it. Contacts and dof are those of all problems of a catalogue. Sweeps are those of our nsgs to
-TOLERANCE on a sample of a family, evenly spread; one that ends at MOST sweeps, or after SECONDS,
-counts with the sweeps that it took.
+names tell these; it is no part of this project. With it there is a second table, of the quantiles
+of contacts, dof and sweeps of each set, and of ours under it (NAME-distributions). Contacts and dof
+are those of all problems of a catalogue. Sweeps are those of our nsgs to TOLERANCE on a sample of a
+family, evenly spread; one that ends at MOST sweeps, or after SECONDS, counts with the sweeps that
+it took. --pictures draws each published distribution with ours, as shares of problems that have at
+most so many.
 
---pictures draws each published distribution with ours, as shares of problems that have at most so
-many. --report draws the figures 2 to 5 of RT-0444 from ours: contacts, degrees of freedom and their
-ratio of Chain, Capsules, BoxesStack and KaplasTower.
+--report draws the figures 2 to 5 of RT-0444 from ours: contacts, degrees of freedom and their ratio
+of Chain, Capsules, BoxesStack and KaplasTower.
 """
 
 from __future__ import annotations
@@ -30,33 +36,9 @@ import numpy as np
 import fclib
 from fclib import collections
 from fclib.collections.figures import draw_distribution
+from workshop.sets import collection_table
 from workshop.tables import _results
 
-# set of the published files: ours
-BESIDE: Final = {
-    "Local/siconos/Chain": "rt444/Chain",
-    "Local/siconos/Capsules": "rt444/Capsules",
-    "Local/siconos/BoxesStack": "rt444/BoxesStack",
-    "Local/siconos/KaplasTower": "rt444/KaplasTower",
-    "Local/siconos/Chute_1000": "rr9118/Chute1000",
-    "Local/siconos/Chute_4000": "rr9118/Chute4000",
-    "Local/LMGC90/100_PR_PerioBox": "rr9118/PeriodicBox",
-    "Local/LMGC90/945_SP_Box_PL": "rr9118/SpheresBox",
-    "Local/LMGC90/Aqueduct_PR": "rr9118/Aqueduct",
-    "Local/LMGC90/Bridge_PR": "rr9118/Bridge",
-    "Local/LMGC90/Cubes_H8": "rr9118/CubesH8",
-    "Local/LMGC90/LowWall_FEM": "rr9118/LowWallFEM",
-    "Global/LMGC90/cubes_H8": "rr9118/CubesH8x2",
-    "Global/siconos/BoxStacks": "rt444/BoxesStack",
-    "Global/siconos/Capsules": "rt444/Capsules",
-    "Global/siconos/KaplasTower": "rt444/KaplasTower",
-    "Global/siconos/Chute": "granular/Chute",
-    "Global/siconos/PrimitiveSoup": "granular/PrimitiveSoup",
-    "Global/siconos/Spheres": "granular/Spheres",
-    "RollingGlobal/siconos/Chute": "rolling/RollingChute",
-    "RollingGlobal/siconos/PrimitiveSoup": "rolling/RollingSoup",
-    "RollingGlobal/siconos/SpheresPile": "rolling/RollingSpheres",
-}
 # figures 2 to 5 of RT-0444, in their order
 REPORT: Final = ("Chain", "Capsules", "BoxesStack", "KaplasTower")
 # column of the published files: ours, and its word
@@ -69,18 +51,30 @@ QUANTILES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 TOLERANCE: Final = 1e-8
 
 
+def sets() -> list[dict[str, str]]:
+    """The published sets: their figures, ours beside each, and how the names of its files begin."""
+    with collection_table.PUBLISHED.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def published(path: Path) -> dict[str, dict[str, list[float]]]:
-    """What is known of the files of each set, by measure. ValueError: a column is missing."""
+    """What is known of the files of each set, by measure. ValueError: a column is missing.
+
+    Files of no set that is known here are those of a set named as the list names it.
+    """
+    begins = {row["files"]: row["set"] for row in sets() if row["files"]}
     found: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with path.open(newline="", encoding="utf-8") as file:
         rows = csv.DictReader(file)
-        missing = {"set", *MEASURES} - set(rows.fieldnames or ())
+        missing = {"set", "file", *MEASURES} - set(rows.fieldnames or ())
         if missing:
             raise ValueError(f"{path}: has no column {min(missing)}")
         for row in rows:
-            for name in MEASURES:
-                if row[name]:
-                    found[row["set"]][name].append(float(row[name]))
+            own = f"{row['set']}/{row['file']}"
+            name = next((begins[begin] for begin in begins if own.startswith(begin)), row["set"])
+            for measure in MEASURES:
+                if row[measure]:
+                    found[name][measure].append(float(row[measure]))
     return found
 
 
@@ -154,12 +148,72 @@ def report(ours: dict[str, Any], out: Path) -> None:
         print(f"{target}: {name}")
 
 
+def beside(ours: dict[str, Any], sample: int, limit: int) -> list[dict[str, str]]:
+    """The rows of the sets, each with ours under it; families without a set come last."""
+    table, left = [], dict(ours)
+
+    def row(name: str, published: dict[str, str] | None = None) -> dict[str, str]:
+        folder, rows = ours[name]
+        figures = collection_table.spectra(folder, rows, sample, limit)
+        verdict = collection_table.within(published, rows, figures) if published else ""
+        return collection_table.line(name, rows, figures, verdict)
+
+    for theirs in sets():
+        head = {**theirs, "rank ratio": theirs["rank_ratio"], "within": ""}
+        shown = {name: head[name] for name in collection_table.HEAD}
+        table.append(shown | {"set": f"*{theirs['set']}*"})
+        if theirs["ours"] in ours:
+            left.pop(theirs["ours"], None)
+            table.append(row(theirs["ours"], theirs))
+    return table + [row(name) for name in sorted(left)]
+
+
+def distributions(theirs: Any, ours: dict[str, Any], own: Any) -> list[dict[str, Any]]:
+    """The quantiles of each set, and of ours under them; pictures, if they are asked for."""
+    table: list[dict[str, Any]] = []
+    swept: dict[str, list[float]] = {}
+    known = {row["set"]: row["ours"] for row in sets()}
+    for name in sorted(theirs):
+        family = known.get(name, "")
+        for measure, values in theirs[name].items():
+            table.append(line(f"*{name}*", measure, values))
+            if family not in ours:
+                continue
+            folder, rows = ours[family]
+            column, label = MEASURES[measure]
+            if column:
+                mine = [row[column] for row in rows]
+            else:
+                if family not in swept:
+                    swept[family] = [
+                        sweeps_of(folder / (row["local_file"] or row["global_file"]), own.most,
+                                  own.seconds)
+                        for row in sample_of(rows, own.sample)
+                    ]  # fmt: skip
+                mine = swept[family]
+            table.append(line(family, measure, mine))
+            if own.pictures:
+                own.pictures.mkdir(parents=True, exist_ok=True)
+                target = own.pictures / f"{name.replace('/', '-')}-{label}.png"
+                draw(target, name, [("published", values), (family, mine)], label)
+    return table
+
+
+def show(table: Sequence[dict[str, Any]]) -> None:
+    """Print a table."""
+    print("| " + " | ".join(table[0]) + " |")
+    print("|" + "---|" * len(table[0]))
+    for row in table:
+        print("| " + " | ".join(map(str, row.values())) + " |", flush=True)
+
+
 def main() -> None:
-    """Print the table, or draw the figures."""
+    """Print the tables, or draw the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folders", type=Path, nargs="+", help="built collections")
     parser.add_argument("--files", type=Path, help="list of the published files")
-    parser.add_argument("--sample", type=int, default=40, help="problems of a family, for sweeps")
+    parser.add_argument("--sample", type=int, default=32, help="problems of a family")
+    parser.add_argument("--limit", type=int, default=1900, help="rows of a W whose rank is found")
     parser.add_argument("--most", type=int, default=200_000, help="sweeps of a solve")
     parser.add_argument("--seconds", type=float, default=20.0, help="limit of a solve")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of both")
@@ -170,44 +224,27 @@ def main() -> None:
     if own.report:
         report(ours, own.report)
         return
-    if not own.files:
-        parser.error("name the list of the published files (--files), or --report")
-    table: list[dict[str, Any]] = []
-    swept: dict[str, list[float]] = {}
-    theirs = published(own.files)
-    for name in sorted(theirs):
-        beside = BESIDE.get(name, "")
-        for measure, values in theirs[name].items():
-            table.append(line(f"*{name}*", measure, values))
-            if beside not in ours:
-                continue
-            folder, rows = ours[beside]
-            column, label = MEASURES[measure]
-            if column:
-                mine = [row[column] for row in rows]
-            else:
-                if beside not in swept:
-                    swept[beside] = [
-                        sweeps_of(folder / (row["local_file"] or row["global_file"]), own.most,
-                                  own.seconds)
-                        for row in sample_of(rows, own.sample)
-                    ]  # fmt: skip
-                mine = swept[beside]
-            table.append(line(beside, measure, mine))
-            if own.pictures:
-                own.pictures.mkdir(parents=True, exist_ok=True)
-                target = own.pictures / f"{name.replace('/', '-')}-{label}.png"
-                draw(target, name, [("published", values), (beside, mine)], label)
-    if not table:
-        raise SystemExit(f"{own.files}: lists no file")
-    print("| " + " | ".join(table[0]) + " |")
-    print("|" + "---|" * len(table[0]))
-    for row in table:
-        print("| " + " | ".join(map(str, row.values())) + " |")
+    theirs = published(own.files) if own.files else {}
+    table = beside(ours, own.sample, own.limit)
+    show(table)
     if own.results:
         _results.store(
             own.results,
             table,
+            title="Published sets (in italics) and ours",
+            note=f"Rank ratio and conditioning are of at most {own.sample} problems of a"
+            f" family, evenly spread, of at most {own.limit} contact components.",
+        )
+    if not own.files:
+        return
+    if not theirs:
+        raise SystemExit(f"{own.files}: lists no file")
+    spread = distributions(theirs, ours, own)
+    show(spread)
+    if own.results:
+        _results.store(
+            f"{own.results}-distributions",
+            spread,
             title="Distributions of the published files (in italics) and ours",
             note="Sizes of published files, and the sweeps that nsgs took on them, are those in"
             f" their names. Ours: nsgs to {_results.power(TOLERANCE)} on at most {own.sample}"

@@ -141,7 +141,7 @@ template <class P>
 void bind_methods(nb::class_<Solution>& solution) {
   const nb::handle type = nb::type<P>();
   const std::string name = class_name(P::kind);
-  if constexpr (!P::rolling) bind_order<P>(type, name);
+  if constexpr (!P::rolling && !P::spin) bind_order<P>(type, name);
   nb::cpp_function_def(
       [](const P& problem) {
         validate(problem);
@@ -160,7 +160,7 @@ void bind_methods(nb::class_<Solution>& solution) {
       "impulse"_a = 1.0, "length"_a = 1.0, nb::call_guard<Unlocked>(),
       nb::sig(("def scaled(self, *, " + std::string(scaling_type) + ") -> " + name).c_str()),
       "The problem in other units: a velocity of 1 becomes `velocity`, an impulse of 1 `impulse`, "
-      "and, for rolling friction, a length of 1 `length`.\n\n"
+      "and, for rolling or spin friction, a length of 1 `length`.\n\n"
       "Raises OptionError if a factor is not positive.");
   const auto argument = [&](const char* method, const char* more) {
     return "def " + std::string(method) + "(self, problem: " + name + more + ") -> Solution";

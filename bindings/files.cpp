@@ -291,7 +291,8 @@ void bind_siconos(nb::module_& m) {
       "path"_a, "kind"_a = nb::none(),
       nb::sig(signature("read_siconos", ", kind: str | None = None", problem_union()).c_str()),
       "The problem in a text file of Siconos (\".dat\"), validated. What it holds is told from its "
-      "sizes, or by `kind` (\"local\", \"global\", \"local_rolling\", \"global_rolling\").\n\n"
+      "sizes, or by `kind` (\"local\", \"global\", \"local_rolling\", "
+      "\"global_rolling\", \"local_spin\", \"global_spin\").\n\n"
       "Raises FileError, naming file and line, ProblemError, or OptionError if there is no such "
       "kind.");
 }

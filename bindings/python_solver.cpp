@@ -30,7 +30,7 @@ nb::object local_problem(const ReducedProblem& reduced) {
     if constexpr (P::rolling) problem.mu_r = reduced.friction.mu_r;
     return nb::cast(std::move(problem));
   };
-  return reduced.rolling() ? fill(LocalRollingProblem{}) : fill(LocalProblem{});
+  return reduced.friction.mu_r.size() > 0 ? fill(LocalRollingProblem{}) : fill(LocalProblem{});
 }
 
 /// What a Python solver talks to while it works: fclib::Monitor, and the error of its iterates.

@@ -340,6 +340,7 @@ void bind_solvers(nb::module_& m) {
       .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
       .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
               "the spacedims of rolling problems")
+      .def_ro("spin_dimensions", &Solver::spin_dimensions, "the spacedims of problems with spin")
       .def_ro("options", &Solver::options)
       .def_ro("max_iterations", &Solver::max_iterations, "the limit if the caller sets none")
       .def(

@@ -129,6 +129,7 @@ val describe_solvers() {
     result.set("citation", solver->citation);
     result.set("dimensions", list_of(solver->dimensions, numbers));
     result.set("rolling_dimensions", list_of(solver->rolling_dimensions, numbers));
+    result.set("spin_dimensions", list_of(solver->spin_dimensions, numbers));
     result.set("max_iterations", to_js(solver->max_iterations));
     result.set("options", list_of(solver->options, [](const auto& one) { return describe(one); }));
     return result;

@@ -145,6 +145,7 @@ export interface SolverInfo {
   citation: string;
   dimensions: number[];
   rolling_dimensions: number[];
+  spin_dimensions: number[];
   max_iterations: number;
   options: OptionInfo[];
 }

@@ -12,8 +12,9 @@
 namespace fclib {
 
 /// A length that fields share: degrees of freedom n, local unknowns m = d nc, bilateral
-/// constraints p, contacts nc; `one` for scalars and vectors' second extent.
-enum class Dim { one, n, m, p, nc };
+/// constraints p, contacts nc, those nr that resist rolling too; `one` for scalars and vectors'
+/// second extent.
+enum class Dim { one, n, m, p, nc, nr };
 
 constexpr std::string_view name_of(Dim dim) {
   switch (dim) {
@@ -27,6 +28,8 @@ constexpr std::string_view name_of(Dim dim) {
       return "p";
     case Dim::nc:
       return "nc";
+    case Dim::nr:
+      return "nr";
   }
   return "?";
 }

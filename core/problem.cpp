@@ -45,6 +45,19 @@ void validate(const P& problem) {
                     std::to_string(planar) + " or " + std::to_string(spatial),
                 place_of<P>("spacedim"));
   }
+  if constexpr (P::spin) {
+    if (problem.coupled != 0 && problem.coupled != 1) {
+      throw Error(ErrorKind::problem,
+                  "is " + std::to_string(problem.coupled) + ", but must be 0 or 1",
+                  place_of<P>("coupled"));
+    }
+    if (problem.coupled == 1 && problem.spacedim != 4) {
+      throw Error(ErrorKind::problem,
+                  "is 1, but spacedim is " + std::to_string(problem.spacedim) +
+                      ": only sliding and spin (spacedim 4) may be coupled",
+                  place_of<P>("coupled"));
+    }
+  }
   if (problem.mu.size() > std::numeric_limits<Index>::max() / problem.spacedim) {
     throw Error(ErrorKind::problem, "has more contacts than can be numbered",
                 place_of<P>("vectors/mu"));

@@ -107,20 +107,71 @@ bool is_mixed(const P& problem) {
   return problem.size(Dim::p) > 0;
 }
 
-/// "3DFC", "M3DFC", "G2DFC", "GR3DFC", ...: the formulation, as in RT-0444. R stands for rolling.
+/// "3DFC", "M3DFC", "G2DFC", "GR3DFC", ...: the formulation, as in RT-0444. R stands for rolling, S
+/// for spin, E for the ellipsoid of both.
 template <class P>
 std::string formulation(const P& problem) {
-  const Index space = P::rolling ? (problem.spacedim + 1) / 2 : problem.spacedim;
-  return std::string(P::prefix) + (is_mixed(problem) ? "M" : "") + std::to_string(space) + "DFC";
+  std::string law;
+  Index space = P::rolling ? (problem.spacedim + 1) / 2 : problem.spacedim;
+  if constexpr (P::spin) {
+    law = problem.coupled != 0 ? "E" : problem.spacedim == 6 ? "R" : "";
+    space = 3;
+  }
+  return std::string(P::prefix) + law + (is_mixed(problem) ? "M" : "") + std::to_string(space) +
+         "DFC";
 }
 
 /// The coefficients of friction of all contacts.
 template <class P>
 Friction friction_of(const P& problem) {
-  Friction friction{problem.mu, {}};
-  if constexpr (P::rolling) friction.mu_r = problem.mu_r;
+  Friction friction{.mu = problem.mu, .mu_r = {}, .mu_s = {}};
+  if constexpr (requires { problem.mu_r; }) friction.mu_r = problem.mu_r;
+  if constexpr (P::spin) {
+    friction.mu_s = problem.mu_s;
+    friction.coupled = problem.coupled != 0;
+  }
   return friction;
 }
+
+/// Copies the contact law of a problem to one of another form: spacedim, the coefficients.
+template <class To, class From>
+void copy_law(const From& from, To& to) {
+  for_each_field<To>([&]<class Member>(const Field<To, Member>& own) {
+    for_each_field<From>([&]<class Other>(const Field<From, Other>& field) {
+      if constexpr (std::is_same_v<Member, Other> && !std::is_same_v<Member, Matrix>) {
+        const bool of_law =
+            field.rows == Dim::one || field.rows == Dim::nc || field.rows == Dim::nr;
+        if (field.name == own.name && of_law) to.*own.member = from.*field.member;
+      }
+    });
+  });
+}
+
+namespace detail {
+/// "global_rolling" and "local_rolling" have one law.
+constexpr bool same_law(std::string_view global, std::string_view local) {
+  constexpr std::string_view of_global = "global";
+  constexpr std::string_view of_local = "local";
+  return global.starts_with(of_global) && local.starts_with(of_local) &&
+         global.substr(of_global.size()) == local.substr(of_local.size());
+}
+template <class P, class... Q>
+consteval auto local_form(std::type_identity<std::variant<Q...>>) {
+  constexpr std::size_t at = [] {
+    std::size_t k = 0;
+    for (const bool same : {same_law(P::kind, Q::kind)...}) {
+      if (same) break;
+      ++k;
+    }
+    return k;
+  }();
+  return std::type_identity<std::variant_alternative_t<at, std::variant<Q...>>>{};
+}
+}  // namespace detail
+
+/// The local formulation with the law of a global one.
+template <class P>
+using LocalFormOf = typename decltype(detail::local_form<P>(std::type_identity<Problem>{}))::type;
 
 namespace detail {
 /// Throws Error (problem) if two sizes differ.

@@ -16,7 +16,8 @@
  *       K* contains u^,   u^ . r = 0,   r in K = { ||r_T|| <= mu r_N }.
  *
  *   d is 2 or 3. With rolling (d is 3 or 5: N, T, R), K also asks for ||r_R|| <= mu_r r_N, and
- *   u^_N = u_N + mu ||u_T|| + mu_r ||u_R||.
+ *   u^_N = u_N + mu ||u_T|| + mu_r ||u_R||. With spin (d is 4 or 6: N, T, S, R), K also asks for
+ *   |r_S| <= mu_s r_N, or, coupled, for (||r_T|| / mu)^2 + (r_S / mu_s)^2 <= r_N^2.
  *
  * Errors
  *
@@ -176,6 +177,39 @@ struct FCLIB_APICOMPILE fclib_local_rolling {
   struct fclib_info* info;
 };
 
+/** New. The global problem with spin friction, the resistance to turning about the normal. A
+ * contact has the components N, T1, T2, S, or N, T1, T2, S, R1, R2 if it resists rolling too. */
+struct FCLIB_APICOMPILE fclib_global_spin {
+  struct fclib_matrix* M;
+  struct fclib_matrix* H;
+  struct fclib_matrix* G;
+  double* mu;
+  double* mu_s; /**< coefficient of spin friction of each contact (nc) [m] */
+  double* mu_r; /**< coefficient of rolling friction (nc) [m], NULL if spacedim is 4 */
+  double* f;
+  double* b;
+  double* w;
+  int coupled;  /**< 1: sliding and spin share one limit, an ellipsoid (spacedim 4); 0: not */
+  int spacedim; /**< 4 or 6 */
+  struct fclib_info* info;
+};
+
+/** New. The local problem with spin friction, the resistance to turning about the normal. A contact
+ *  has the components N, T1, T2, S, or N, T1, T2, S, R1, R2 if it resists rolling too. */
+struct FCLIB_APICOMPILE fclib_local_spin {
+  struct fclib_matrix* W;
+  struct fclib_matrix* V;
+  struct fclib_matrix* R;
+  double* mu;
+  double* mu_s; /**< coefficient of spin friction of each contact (nc) [m] */
+  double* mu_r; /**< coefficient of rolling friction (nc) [m], NULL if spacedim is 4 */
+  double* q;
+  double* s;
+  int coupled;  /**< 1: sliding and spin share one limit, an ellipsoid (spacedim 4); 0: not */
+  int spacedim; /**< 4 or 6 */
+  struct fclib_info* info;
+};
+
 /** A solution, or a guess. */
 struct FCLIB_APICOMPILE fclib_solution {
   double* v; /**< generalised velocity (n), NULL for a local problem [m/s] */
@@ -194,6 +228,8 @@ int fclib_write_global(struct fclib_global* problem, const char* path);
 int fclib_write_local(struct fclib_local* problem, const char* path);
 int fclib_write_global_rolling(struct fclib_global_rolling* problem, const char* path); /* new */
 int fclib_write_local_rolling(struct fclib_local_rolling* problem, const char* path);   /* new */
+int fclib_write_global_spin(struct fclib_global_spin* problem, const char* path);       /* new */
+int fclib_write_local_spin(struct fclib_local_spin* problem, const char* path);         /* new */
 
 /** Adds the solution of the problem that is in the file. Its arrays must have the lengths of that
  *  problem. Each may be NULL. If u or v is NULL, it follows from r (and l, if p > 0) by the
@@ -211,6 +247,8 @@ struct fclib_global* fclib_read_global(const char* path);
 struct fclib_local* fclib_read_local(const char* path);
 struct fclib_global_rolling* fclib_read_global_rolling(const char* path); /* new */
 struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new */
+struct fclib_global_spin* fclib_read_global_spin(const char* path);       /* new */
+struct fclib_local_spin* fclib_read_local_spin(const char* path);         /* new */
 
 /** Reads the solution. Its arrays have the lengths of the problem in the file. If the file lacks u
  *  or v, it follows from r. Returns NULL on failure, or if there is no solution. Free it with
@@ -228,7 +266,8 @@ struct fclib_solution* fclib_read_guesses(const char* path, int* number_of_guess
 int fclib_create_int_attributes_in_info(const char* path, const char* attr_name, int attr_value);
 
 /** New. The kind of the problem that a solution of the file belongs to: "global", "local",
- *  "global_rolling" or "local_rolling". Do not free it. NULL if the file holds no problem. */
+ *  "global_rolling", "local_rolling", "global_spin" or "local_spin". Do not free it. NULL if the
+ * file holds no problem. */
 const char* fclib_problem_kind(const char* path);
 
 /** New. The lengths of that problem's arrays: degrees of freedom (0 for a local problem),
@@ -262,6 +301,8 @@ void fclib_delete_global(struct fclib_global* problem);
 void fclib_delete_local(struct fclib_local* problem);
 void fclib_delete_global_rolling(struct fclib_global_rolling* problem); /* new */
 void fclib_delete_local_rolling(struct fclib_local_rolling* problem);   /* new */
+void fclib_delete_global_spin(struct fclib_global_spin* problem);       /* new */
+void fclib_delete_local_spin(struct fclib_local_spin* problem);         /* new */
 
 /** Frees the members of solutions or guesses (count structs), and the array (or NULL) itself. */
 void fclib_delete_solutions(struct fclib_solution* data, int count);
@@ -295,6 +336,8 @@ int fclib_validate_global(const struct fclib_global* problem);
 int fclib_validate_local(const struct fclib_local* problem);
 int fclib_validate_global_rolling(const struct fclib_global_rolling* problem);
 int fclib_validate_local_rolling(const struct fclib_local_rolling* problem);
+int fclib_validate_global_spin(const struct fclib_global_spin* problem);
+int fclib_validate_local_spin(const struct fclib_local_spin* problem);
 
 /** New. Checks whether the members of a solution are finite, and whether the required ones are
  *  there: r, and l if p > 0. Returns 1, or 0. */
@@ -306,6 +349,10 @@ int fclib_validate_global_rolling_solution(const struct fclib_global_rolling* pr
                                            const struct fclib_solution* solution);
 int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* problem,
                                           const struct fclib_solution* solution);
+int fclib_validate_global_spin_solution(const struct fclib_global_spin* problem,
+                                        const struct fclib_solution* solution);
+int fclib_validate_local_spin_solution(const struct fclib_local_spin* problem,
+                                       const struct fclib_solution* solution);
 
 /* ---- merits ---------------------------------------------------------------------------------- */
 
@@ -335,6 +382,10 @@ double fclib_merit_global_rolling(struct fclib_global_rolling* problem, enum fcl
                                   struct fclib_solution* solution); /* new */
 double fclib_merit_local_rolling(struct fclib_local_rolling* problem, enum fclib_merit merit,
                                  struct fclib_solution* solution); /* new */
+double fclib_merit_global_spin(struct fclib_global_spin* problem, enum fclib_merit merit,
+                               struct fclib_solution* solution); /* new */
+double fclib_merit_local_spin(struct fclib_local_spin* problem, enum fclib_merit merit,
+                              struct fclib_solution* solution); /* new */
 #endif
 
 /* ---- solving --------------------------------------------------------------------------------- */
@@ -391,6 +442,12 @@ int fclib_solve_global_rolling(const struct fclib_global_rolling* problem, const
 int fclib_solve_local_rolling(const struct fclib_local_rolling* problem, const char* solver,
                               const struct fclib_solve_options* options,
                               struct fclib_solution* solution, struct fclib_solve_result* result);
+int fclib_solve_global_spin(const struct fclib_global_spin* problem, const char* solver,
+                            const struct fclib_solve_options* options,
+                            struct fclib_solution* solution, struct fclib_solve_result* result);
+int fclib_solve_local_spin(const struct fclib_local_spin* problem, const char* solver,
+                           const struct fclib_solve_options* options,
+                           struct fclib_solution* solution, struct fclib_solve_result* result);
 
 /** New. What y >= 0 (nc) and z (p; NULL for zeros) prove: no reactions with a norm below the result
  *  are a solution. INFINITY: there is no solution. 0: nothing is proven. NaN: the problem, y or z
@@ -408,6 +465,10 @@ double fclib_certificate_global_rolling(const struct fclib_global_rolling* probl
                                         const double* z);
 double fclib_certificate_local_rolling(const struct fclib_local_rolling* problem, const double* y,
                                        const double* z);
+double fclib_certificate_global_spin(const struct fclib_global_spin* problem, const double* y,
+                                     const double* z);
+double fclib_certificate_local_spin(const struct fclib_local_spin* problem, const double* y,
+                                    const double* z);
 
 /** New. The name of solver number k = 0, 1, ..., or NULL after the last. Do not free it. */
 const char* fclib_solver_name(int k);
@@ -472,6 +533,10 @@ struct fclib_report* fclib_solve_global_rolling_with(const struct fclib_global_r
                                                      const struct fclib_options* options);
 struct fclib_report* fclib_solve_local_rolling_with(const struct fclib_local_rolling* problem,
                                                     const struct fclib_options* options);
+struct fclib_report* fclib_solve_global_spin_with(const struct fclib_global_spin* problem,
+                                                  const struct fclib_options* options);
+struct fclib_report* fclib_solve_local_spin_with(const struct fclib_local_spin* problem,
+                                                 const struct fclib_options* options);
 
 /** New. The parts of MERIT_2, as numbers: "error" (all of it), "natural", "scaled_natural",
  *  "dynamics", "bilateral", "kinematics"; "cone", "dual_cone" and "complementarity", each the
@@ -485,6 +550,10 @@ struct fclib_report* fclib_judge_global_rolling(const struct fclib_global_rollin
                                                 const struct fclib_solution* solution);
 struct fclib_report* fclib_judge_local_rolling(const struct fclib_local_rolling* problem,
                                                const struct fclib_solution* solution);
+struct fclib_report* fclib_judge_global_spin(const struct fclib_global_spin* problem,
+                                             const struct fclib_solution* solution);
+struct fclib_report* fclib_judge_local_spin(const struct fclib_local_spin* problem,
+                                            const struct fclib_solution* solution);
 
 /** New. Write like fclib_write_global() and its like, fclib_write_solution() and
  *  fclib_write_guesses(), with the options (or NULL) of this call. Return 1, or 0. */
@@ -496,6 +565,10 @@ int fclib_write_global_rolling_with(const struct fclib_global_rolling* problem, 
                                     const struct fclib_options* options);
 int fclib_write_local_rolling_with(const struct fclib_local_rolling* problem, const char* path,
                                    const struct fclib_options* options);
+int fclib_write_global_spin_with(const struct fclib_global_spin* problem, const char* path,
+                                 const struct fclib_options* options);
+int fclib_write_local_spin_with(const struct fclib_local_spin* problem, const char* path,
+                                const struct fclib_options* options);
 int fclib_write_solution_with(const struct fclib_solution* solution, const char* path,
                               const struct fclib_options* options);
 int fclib_write_guesses_with(int number_of_guesses, const struct fclib_solution* guesses,
@@ -517,6 +590,7 @@ const char* fclib_option_text(const char* solver, int k, const char* what);
 struct fclib_local* fclib_condense_global(const struct fclib_global* problem);
 struct fclib_local_rolling* fclib_condense_global_rolling(
     const struct fclib_global_rolling* problem);
+struct fclib_local_spin* fclib_condense_global_spin(const struct fclib_global_spin* problem);
 
 /** New. Fills u and v, or the one of them that is not NULL, with what follows from r (and l, if p >
  *  0). So it turns a solution of the condensed problem into one of the global problem. Returns 1,
@@ -527,6 +601,10 @@ int fclib_complete_global_rolling(const struct fclib_global_rolling* problem,
                                   struct fclib_solution* solution);
 int fclib_complete_local_rolling(const struct fclib_local_rolling* problem,
                                  struct fclib_solution* solution);
+int fclib_complete_global_spin(const struct fclib_global_spin* problem,
+                               struct fclib_solution* solution);
+int fclib_complete_local_spin(const struct fclib_local_spin* problem,
+                              struct fclib_solution* solution);
 
 /** New. Read and write the text format (.dat) of Siconos, which has no bilateral constraints. A
  *  write replaces the file. On failure a read returns NULL, a write 0. */
@@ -539,6 +617,10 @@ int fclib_write_siconos_global_rolling(const struct fclib_global_rolling* proble
                                        const char* path);
 struct fclib_local_rolling* fclib_read_siconos_local_rolling(const char* path);
 int fclib_write_siconos_local_rolling(const struct fclib_local_rolling* problem, const char* path);
+struct fclib_global_spin* fclib_read_siconos_global_spin(const char* path);
+int fclib_write_siconos_global_spin(const struct fclib_global_spin* problem, const char* path);
+struct fclib_local_spin* fclib_read_siconos_local_spin(const char* path);
+int fclib_write_siconos_local_spin(const struct fclib_local_spin* problem, const char* path);
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
@@ -635,6 +717,10 @@ int fclib_sequence_add_global_rolling(struct fclib_sequence* sequence,
                                       const struct fclib_global_rolling* problem, int world);
 int fclib_sequence_add_local_rolling(struct fclib_sequence* sequence,
                                      const struct fclib_local_rolling* problem, int world);
+int fclib_sequence_add_global_spin(struct fclib_sequence* sequence,
+                                   const struct fclib_global_spin* problem, int world);
+int fclib_sequence_add_local_spin(struct fclib_sequence* sequence,
+                                  const struct fclib_local_spin* problem, int world);
 
 /** New. Add to the step. A solution and guesses need r, and l if p > 0; v and u may be NULL. Return
  *  1, or 0. */

@@ -76,9 +76,12 @@ FCLIB_CALLS(global)
 FCLIB_CALLS(local)
 FCLIB_CALLS(global_rolling)
 FCLIB_CALLS(local_rolling)
+FCLIB_CALLS(global_spin)
+FCLIB_CALLS(local_spin)
 #undef FCLIB_CALLS
 
-/// fclib_global, fclib_local, fclib_global_rolling, fclib_local_rolling.
+/// fclib_global, fclib_local, fclib_global_rolling, fclib_local_rolling, fclib_global_spin,
+/// fclib_local_spin.
 template <class C>
 concept Problem = requires { Calls<std::remove_cv_t<C>>::name; };
 
@@ -132,6 +135,7 @@ Sizes sizes(const C& problem) {
   }
 FCLIB_SPAN(mu, nc)
 FCLIB_SPAN(mu_r, nc)
+FCLIB_SPAN(mu_s, nc)
 FCLIB_SPAN(q, m)
 FCLIB_SPAN(s, p)
 FCLIB_SPAN(f, n)

@@ -249,10 +249,62 @@ def least_reactions(A: Doubles, effect: Doubles) -> Balls:
 # ---- one contact
 
 
+class Axes(list[arb]):
+    """The half-axes of an ellipsoid, one for each tangential component."""
+
+
 def groups(x: Balls, limits: Sequence[arb]) -> list[Balls]:
-    """The components behind the normal one: x_T, and x_R with rolling friction."""
+    """The components behind the normal one: x_T, then x_R with rolling friction.
+
+    With spin, which makes their number even, x_T, x_S, x_R.
+    """
+    if len(x) % 2 == 0:
+        return [x[1:3], x[3:4], x[4:6]][: len(limits)]
     size = (len(x) - 1) // len(limits)
     return [x[1 + k * size : 1 + (k + 1) * size] for k in range(len(limits))]
+
+
+def project_on_ellipsoid(x: Balls, axes: Axes) -> Balls:
+    """P_K(x) for K = { sum of (r_k / e_k)^2 <= r_N^2 }.
+
+    By the multiplier of the limit, p_k = e_k^2 n x_k / (n (1 + e_k^2) - x_N), and n is the root of
+    a decreasing function between max(0, x_N) and |x_N| + sum of |e_k x_k|. The interval is halved
+    until the sign is not known.
+    """
+    pairs = [(e, t) for e, t in zip(axes, x[1:], strict=True) if e > 0]
+
+    def beyond(n: arb) -> arb:
+        return sum(((e * t / (n * (1 + e * e) - x[0])) ** 2 for e, t in pairs), arb(0)) - 1
+
+    low = x[0].max(arb(0))
+    if x[0] + norm([e * t for e, t in pairs]) <= 0:
+        n = arb(0)
+    elif x[0] > 0 and norm([t / e for e, t in pairs]) <= x[0]:
+        n = x[0]
+    else:
+        high = abs(x[0]) + sum((abs(e * t) for e, t in pairs), arb(0))
+        low, high = arb(low.mid()), arb(high.mid()) + abs(arb(high.mid())) * 2**-20
+        for _ in range(2 * ctx.prec):
+            middle = arb(((low + high) / 2).mid())
+            value = beyond(middle)
+            if value > 0:
+                low = middle
+            elif value < 0:
+                high = middle
+            else:
+                # no number between the two has a known sign
+                low, high = low.union(middle), high.union(middle)
+                break
+        n = low.union(high)
+    result = [n]
+    for e, t in zip(axes, x[1:], strict=True):
+        if not e > 0:
+            result.append(arb(0))
+        elif x[0] > 0 and n is x[0]:
+            result.append(t)
+        else:
+            result.append(e * e * n / (n * (1 + e * e) - x[0]) * t if not is_zero(n) else arb(0))
+    return result
 
 
 def project(x: Balls, limits: Sequence[arb]) -> Balls:
@@ -263,6 +315,8 @@ def project(x: Balls, limits: Sequence[arb]) -> Balls:
     limits that bind. So n is the largest of their roots, and 0 at least. No case is told from
     another, so that balls on a boundary do not matter.
     """
+    if isinstance(limits, Axes):
+        return project_on_ellipsoid(x, limits)
     parts = groups(x, limits)
     norms = [norm(part) for part in parts]
     n = arb(0)
@@ -283,6 +337,13 @@ def modified(u: Balls, limits: Sequence[arb], slips: Sequence[arb] | None = None
     `slips` are those at most that are rounding. So much is none.
     """
     result = u[0]
+    if isinstance(limits, Axes):
+        moves = [u[1:3], u[3:4]]
+        for k, part in enumerate(moves):
+            if slips is not None and not norm(part) > slips[k]:
+                moves[k] = [arb(0) if norm(part) <= slips[k] else t.union(arb(0)) for t in part]
+        stretched = [e * t for e, t in zip(limits, [*moves[0], *moves[1]], strict=True)]
+        return [result + norm(stretched), *u[1:]]
     for k, (c, part) in enumerate(zip(limits, groups(u, limits), strict=True)):
         slip = norm(part)
         if slips is None or slip > slips[k]:
@@ -302,6 +363,12 @@ def status(y: Balls, limits: Sequence[arb]) -> str:
     """The state that P_K(y) tells."""
     if is_zero(project(y, limits)[0]):
         return "open"
+    if isinstance(limits, Axes):
+        inside = y[0] >= 0 and not any(
+            t != 0 for e, t in zip(limits, y[1:], strict=True) if not e > 0
+        )
+        held = [t / e for e, t in zip(limits, y[1:], strict=True) if e > 0]
+        return "stick" if inside and norm(held) <= y[0] else "slide"
     sizes = zip(limits, groups(y, limits), strict=True)
     return "stick" if all(norm(part) <= c * y[0] for c, part in sizes) else "slide"
 
@@ -512,8 +579,10 @@ def contacts(problem: Any, solution: Any, terms: Terms, rounding: bool) -> Verdi
     """The parts that follow from u, r and q contact by contact."""
     d, nc = problem.spacedim, problem.nc
     coefficients = [balls(problem.mu)]
-    if hasattr(problem, "mu_r"):
-        coefficients.append(balls(problem.mu_r))
+    for name in ("mu_s", "mu_r"):
+        if getattr(problem, name, None) is not None:
+            coefficients.append(balls(getattr(problem, name)))
+    coupled = bool(getattr(problem, "coupled", 0))
     sizes = [sum((abs(x) for x in own), arb(0)) / d for own in by_contact(terms.diagonal, d)]
     known = [x for x in sizes if not is_zero(x)]
     others = sum(known, arb(0)) / len(known) if known else arb(1)
@@ -525,7 +594,9 @@ def contacts(problem: Any, solution: Any, terms: Terms, rounding: bool) -> Verdi
     cone, dual, power = zeros(nc), zeros(nc), zeros(nc)
     counts = {"open": 0, "stick": 0, "slide": 0}
     for a in range(nc):
-        limits = [each[a] for each in coefficients]
+        limits: Sequence[arb] = [each[a] for each in coefficients]
+        if coupled:
+            limits = Axes([limits[0], limits[0], limits[1]])
         hat = modified(u[a], limits, slips[a])
         natural[a] = (norm(natural_map(r[a], hat, limits, arb(1))) - allowed[a]).max(arb(0))
         scaled = norm(natural_map(r[a], hat, limits, rho[a]))
@@ -567,7 +638,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution, rounding: bool = Fal
     if not all(np.isfinite(x).all() for x in given if x is not None):
         inf = arb("inf")  # what is not a number is as wrong as can be
         return Verdict(inf, inf, inf, inf, inf, inf, inf, inf, 0, 0, 0, [])
-    local = isinstance(problem, fclib.LocalProblem | fclib.LocalRollingProblem)
+    local = problem.kind.startswith("local")
     equations: Callable[..., Terms] = local_terms if local else global_terms
     units = (UNIT, UNIT_OF_Q) if rounding else (0.0, 0.0)
     for precision in PRECISIONS:

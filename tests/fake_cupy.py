@@ -122,7 +122,7 @@ class Device:
         pass
 
 
-def made() -> types.ModuleType:
+def made() -> Any:
     """The module `cupy`."""
     module: Any = types.ModuleType("cupy")
     for name in ("float64", "int32", "uint64", "cumsum"):

@@ -304,6 +304,95 @@ def planted_rolling(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingP
     return problem, r.ravel()
 
 
+def spin_states(
+    rng: np.random.Generator, law: dict[str, Array], coupled: bool, edges: bool = True
+) -> tuple[Array, Array, tuple[int, int, int]]:
+    """Velocities and reactions (nc, d) of contacts with spin, in turn over all their states.
+
+    A contact is open, or each of its groups sticks or moves: sliding, spin and rolling if there is
+    mu_r. With `edges` some graze, u_N and r are 0, and some that stick are just at the limit.
+    """
+    mu, mu_s, mu_r = law["mu"], law["mu_s"], law.get("mu_r")
+    nc, d = mu.size, 4 if mu_r is None else 6
+    parts = [(slice(1, 3), mu), (slice(3, 4), mu_s)]
+    parts += [] if mu_r is None else [(slice(4, 6), mu_r)]
+    u, r = np.zeros((nc, d)), np.zeros((nc, d))
+    counts = [0, 0, 0]
+    for k in range(nc):
+        state = k % (1 + 2 ** len(parts))
+        if state == 0:
+            counts[0] += 1
+            if k % 2 == 0 or not edges:  # the others graze
+                u[k] = rng.normal(size=d)
+                u[k, 0] = abs(u[k, 0]) + 0.1
+            continue
+        moves = [bool((state - 1) >> g & 1) for g in range(len(parts))]
+        counts[2 if any(moves) else 1] += 1
+        r[k, 0] = rng.uniform(0.5, 2)
+        if coupled:
+            axes = np.array([mu[k], mu[k], mu_s[k]])
+            way = rng.normal(size=3) * [moves[0], moves[0], moves[1]]
+            if any(moves):
+                u[k, 1:] = way
+                pull = np.linalg.norm(axes * way)
+                r[k, 1:] = -r[k, 0] * axes**2 * way / pull if pull > 0 else 0.0
+            else:
+                ball = rng.normal(size=3)
+                r[k, 1:] = 0.5 * r[k, 0] * axes * ball / np.linalg.norm(ball)
+            continue
+        for (part, limit), moving in zip(parts, moves, strict=True):
+            way = rng.normal(size=part.stop - part.start)
+            way /= np.linalg.norm(way)
+            r[k, part] = (
+                limit[k]
+                * r[k, 0]
+                * way
+                * (1.0 if moving else rng.choice([0.5, 1.0]) if edges else 0.5)
+            )
+            u[k, part] = -way * rng.uniform(0.5, 2) if moving else 0.0
+    return u, r, (counts[0], counts[1], counts[2])
+
+
+SPIN_LAWS = (("product", 4), ("product", 6), ("ellipsoid", 4))
+
+
+def planted_spin(
+    law: str,
+    d: int,
+    seed: int,
+    nc: int = 10,
+    without: bool = False,
+    ratio: float = 1.0,
+    edges: bool = True,
+) -> tuple[fclib.LocalSpinProblem, Array]:
+    """A problem with spin and its reactions.
+
+    `without` takes the friction of one kind, or of all, from some contacts; masses differ by
+    `ratio`; `edges` puts contacts on the borders between their states.
+    """
+    rng = np.random.default_rng(seed)
+    bounds = {"mu": rng.uniform(0.2, 0.8, nc), "mu_s": rng.uniform(0.05, 0.3, nc)}
+    if d == 6:
+        bounds["mu_r"] = rng.uniform(0.05, 0.3, nc)
+    if without:
+        for number, values in enumerate(bounds.values()):
+            values[rng.uniform(size=nc) < 0.3] = 0.0
+            values[number::7] = 0.0
+    u, r, _ = spin_states(rng, bounds, law == "ellipsoid", edges)
+    root = rng.normal(size=(nc * d, nc * d)) / np.sqrt(nc * d)
+    size = np.exp(rng.uniform(0, 0.5 * np.log(ratio), nc)).repeat(d)
+    W = size[:, None] * (root @ root.T + 0.5 * np.eye(nc * d)) * size
+    W = (W + W.T) / 2
+    problem = fclib.LocalSpinProblem(
+        spacedim=d,
+        W=W,
+        q=u.ravel() - W @ r.ravel(),
+        coupled=int(law == "ellipsoid"),
+        **bounds,
+    )
+    return problem, r.ravel()
+
+
 def auto_chain() -> list[str]:
     """The stages of `auto`, a line each."""
     (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")

@@ -10,6 +10,8 @@ are solved by `auto`, by the solver that is named, or by all built-in solvers in
     corners         contacts at the corners of the law: they graze, roll without sliding, slide
                     without rolling, stick at a limit; mu and mu_r from 0 to 2^40; half of them in
                     whole numbers, so that the solution is exact
+    spin            contacts with spin friction, of each law in turn: the product, the product with
+                    rolling, the ellipsoid
     held limits     limits that closed loops of joints hold
     nearly          joints that contradict each other by rounding, or by a little more
     contradicting   joints that contradict each other
@@ -37,8 +39,8 @@ import numpy.typing as npt
 
 import fclib
 from ball_judge import judge
-from fclib import analysis
-from helpers import dense, planted_law
+from fclib import _registry, analysis
+from helpers import SPIN_LAWS, dense, planted_law, spin_states
 
 Array: TypeAlias = npt.NDArray[np.float64]
 # a problem, a solution of it, and a guess
@@ -264,6 +266,47 @@ def corner(rng: np.random.Generator, d: int, limits: Array) -> tuple[Array, Arra
     return u, r
 
 
+def spinning(number: int) -> tuple[Any, fclib.Solution, Array | None]:
+    """Problem `number` with spin friction, its solution, and a guess.
+
+    The law is that of SPIN_LAWS in turn. Coefficients may be zero, far from each other, or one and
+    the same; contacts graze, stick at their limits, and move in each way.
+    """
+    rng = np.random.default_rng([number, 2033])
+    name, d = SPIN_LAWS[number % len(SPIN_LAWS)]
+    nc = int(rng.integers(1, 8))
+    spread = rng.choice([0.0, 1.0, 6.0])
+    law = {
+        key: size * 10.0 ** rng.uniform(-spread, spread / 6, nc) * (rng.uniform(size=nc) > 0.15)
+        for key, size in (("mu", 0.5), ("mu_s", 0.02), ("mu_r", 0.01))[: d // 2]
+    }
+    u, r, _ = spin_states(rng, law, name == "ellipsoid")
+    unit = 10.0 ** rng.choice([0, 0, -6, 6])
+    n = int(rng.integers(d + 2, 2 * d * nc + 4))
+    p = int(rng.integers(0, 3))
+    mass = unit * bodies_of(rng, n, 10.0 ** rng.choice([0, 0, 3, 6]))
+    H, G = directions(rng, n, d, nc), joints(rng, n, p)
+    impulse = unit * r.ravel()
+    lam, f = unit * rng.standard_normal(p), unit * rng.standard_normal(n)
+    v = (H @ impulse + G @ lam + f) / mass
+    problem: Any = fclib.GlobalSpinProblem(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=f,
+        w=u.ravel() - H.T @ v,
+        coupled=int(name == "ellipsoid"),
+        **law,
+        **({"G": G, "b": -G.T @ v} if p else {}),
+    )
+    solution = fclib.Solution(v=v, u=u.ravel(), r=impulse, l=lam if p else None)
+    guess = [None, None, impulse * (1 + 1e-3 * rng.standard_normal(d * nc))][rng.integers(3)]
+    if rng.integers(2):  # the local form
+        problem = problem.condense()
+        solution = fclib.Solution(u=u.ravel(), r=impulse, l=lam if p else None)
+    return problem, solution, guess
+
+
 def held(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     """Problem `number` with limits that the joints hold: what remains of them is rounding."""
     rng = np.random.default_rng([number, 2031])
@@ -349,12 +392,11 @@ def in_turn(problem: Any, number: int, solver: str) -> str:
     """The solver, or for `each` one of the built-in solvers that take the problem."""
     if solver != "each":
         return solver
-    rolling = hasattr(problem, "mu_r")
     takers = [
         one.name
         for one in fclib.solvers()
         if one.origin == "fclib"
-        and problem.spacedim in (one.rolling_dimensions if rolling else one.dimensions)
+        and problem.spacedim in _registry.dimensions_of(one, problem.kind)
     ]
     return takers[number % len(takers)]
 
@@ -630,6 +672,7 @@ REGIMES: dict[str, Callable[..., Said]] = {
     "random": verdict,
     "digits": functools.partial(verdict, plant=hard),
     "corners": functools.partial(verdict, plant=corners),
+    "spin": functools.partial(verdict, plant=spinning),
     "held limits": functools.partial(verdict, plant=held),
     "nearly": functools.partial(contradiction, little=True),
     "contradicting": contradiction,

@@ -69,6 +69,10 @@ fclib_local_rolling* fclib_condense_global_rolling(const fclib_global_rolling* p
   return condensed<fclib_local_rolling>(problem);
 }
 
+fclib_local_spin* fclib_condense_global_spin(const fclib_global_spin* problem) {
+  return condensed<fclib_local_spin>(problem);
+}
+
 #define FCLIB_FUNCTIONS_OF(kind)                                                     \
   int fclib_complete_##kind(const fclib_##kind* problem, fclib_solution* solution) { \
     return complete_solution(problem, solution);                                     \

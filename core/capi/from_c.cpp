@@ -144,7 +144,8 @@ ProblemView view_as_given(const C& c) {
     if constexpr (std::is_same_v<Type, Vector>) {
       const auto size = static_cast<std::size_t>(sizes.size(field.rows));
       const auto values = numbers<double>(c.*member, size, place_of<P>(field));
-      if (written) view.members.push_back({field.name, values});
+      const bool absent = field.presence == Presence::optional && size == 0;
+      if (written && !absent) view.members.push_back({field.name, values});
     } else if constexpr (std::is_same_v<Type, Matrix>) {
       for (const auto& [name, a] : matrices) {
         const bool absent = field.presence != Presence::required && a.absent();

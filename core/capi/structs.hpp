@@ -21,7 +21,8 @@
 #endif
 
 /// The formulations by their names in C: each has the functions and the structs of its name.
-#define FCLIB_FOR_EACH_KIND(of) of(global) of(local) of(global_rolling) of(local_rolling)
+#define FCLIB_FOR_EACH_KIND(of) \
+  of(global) of(local) of(global_rolling) of(local_rolling) of(global_spin) of(local_spin)
 
 namespace fclib::c {
 
@@ -69,6 +70,22 @@ struct Twin<fclib_global_rolling> {
   static constexpr std::tuple members{MEMBER(spacedim), MEMBER(M),    MEMBER(H),
                                       MEMBER(G),        MEMBER(f),    MEMBER(w),
                                       MEMBER(mu),       MEMBER(mu_r), MEMBER(b)};
+};
+template <>
+struct Twin<fclib_local_spin> {
+  using C = fclib_local_spin;
+  using Core = LocalSpinProblem;
+  static constexpr std::tuple members{MEMBER(spacedim), MEMBER(W),  MEMBER(V),    MEMBER(R),
+                                      MEMBER(q),        MEMBER(mu), MEMBER(mu_s), MEMBER(mu_r),
+                                      MEMBER(coupled),  MEMBER(s)};
+};
+template <>
+struct Twin<fclib_global_spin> {
+  using C = fclib_global_spin;
+  using Core = GlobalSpinProblem;
+  static constexpr std::tuple members{MEMBER(spacedim), MEMBER(M),       MEMBER(H),  MEMBER(G),
+                                      MEMBER(f),        MEMBER(w),       MEMBER(mu), MEMBER(mu_s),
+                                      MEMBER(mu_r),     MEMBER(coupled), MEMBER(b)};
 };
 template <>
 struct Twin<fclib_solution> {

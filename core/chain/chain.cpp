@@ -35,16 +35,13 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
     part.known_r.resize(d * count);
     part.known_u.resize(d * count);
   }
-  part.friction.mu.resize(count);
-  if (problem.rolling()) part.friction.mu_r.resize(count);
+  part.friction = problem.friction.of(contacts);
   for (Eigen::Index k = 0; k < count; ++k) {
     part.q.segment(d * k, d) = problem.q.segment(d * contacts[k], d);
     if (known) {
       part.known_r.segment(d * k, d) = problem.known_r.segment(d * contacts[k], d);
       part.known_u.segment(d * k, d) = problem.known_u.segment(d * contacts[k], d);
     }
-    part.friction.mu[k] = problem.friction.mu[contacts[k]];
-    if (problem.rolling()) part.friction.mu_r[k] = problem.friction.mu_r[contacts[k]];
   }
   return part;
 }

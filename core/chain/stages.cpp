@@ -10,7 +10,7 @@
 #include "linalg/memory.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/pivoting.hpp"
-#include "methods/rolling_interior_point.hpp"
+#include "methods/product_interior_point.hpp"
 #include "methods/spectral_gradient.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
@@ -424,7 +424,7 @@ double Island<Cone>::violation(const Vector& r) const {
 
 template <class Cone>
 void Island<Cone>::proximal(ProximalRules rules, Vector r) {
-  rules.own_rolling_rho = true;
+  rules.own_angular_rho = true;
   ProximalPoint<Cone> method(problem_, system());
   const double error =
       method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at, r); });
@@ -458,8 +458,7 @@ class Island<Cone>::ProximalPolish {
 
 template <class Cone>
 void Island<Cone>::run(const InteriorPointStage& stage) {
-  using Path = std::conditional_t<std::is_same_v<Cone, Coulomb<D>>, InteriorPoint<D>,
-                                  RollingInteriorPoint<D == 2 ? 3 : D>>;
+  using Path = typename InteriorPointFor<Cone>::type;
   InteriorPointRules rules = stage;
   if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
   Path method(problem_, system());
@@ -475,7 +474,7 @@ void Island<Cone>::run(const InteriorPointStage& stage) {
 
 template <class Cone>
 void Island<Cone>::run(const HeldBodiesStage& rules) {
-  if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
+  if constexpr (std::is_same_v<Cone, Coulomb<D>> && D <= 3) {
     if (bodies_.whole == nullptr) return;
     const bool all = bodies_.contacts.empty();
     const Primal part = all ? Primal() : restricted(*bodies_.whole, bodies_.contacts, D);
@@ -581,16 +580,15 @@ void Island<Cone>::run(const RandomStartsStage& rules) {
       auto r = start.template segment<D>(D * a);
       r[0] = size * unit[a] * std::pow(10.0, random.between(-2, 2));
       const Cone cone(problem_.friction, a);
-      for (int g = 0; g < Cone::groups; ++g) {
+      for_each_group<Cone>([&](auto g) {
+        constexpr int at = Cone::start(g);
+        constexpr int size = Cone::size(g);
         const double angle = random.between(0, 2 * std::numbers::pi);
         const double share = std::min(1.0, random.between(0, 2));
         const double radius = share * cone.coefficient(g) * r[0];
-        const int at = 1 + g * Cone::group_size;
-        r[at] = radius * (Cone::group_size > 1       ? std::cos(angle)
-                          : angle < std::numbers::pi ? 1
-                                                     : -1);
-        if (Cone::group_size > 1) r[at + Cone::group_size - 1] = radius * std::sin(angle);
-      }
+        r[at] = radius * (size > 1 ? std::cos(angle) : angle < std::numbers::pi ? 1 : -1);
+        if (size > 1) r[at + size - 1] = radius * std::sin(angle);
+      });
     }
     descend(newton, {.sweeps = random_sweeps}, random_limit, start);
     if (!done()) proximal({.max_factorisations = random_polish}, start);
@@ -601,8 +599,7 @@ void Island<Cone>::run(const RandomStartsStage& rules) {
 template <class Cone>
 void Island<Cone>::run(const NoSolutionStage& rules) {
   ReducedProblem frictionless = problem_;
-  frictionless.friction.mu.setZero();
-  frictionless.friction.mu_r.setZero();
+  frictionless.friction.for_each([](Vector& coefficients) { coefficients.setZero(); });
   const double usual = problem_.q.norm() / mean_diagonal(problem_);
   CoupledSystem system(frictionless);
   ProximalPoint<Cone> method(frictionless, system);

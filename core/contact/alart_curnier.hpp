@@ -1,6 +1,6 @@
 // The map of Alart & Curnier, "A mixed formulation for frictional contact problems prone to Newton
 // like solution methods" (1991): z_N is clipped at zero, and each tangential group of z (sliding,
-// and rolling if there is any) is projected on the disk of radius mu max(z_N, 0). Its fixed
+// spin and rolling if there are any) is projected on the disk of radius mu max(z_N, 0). Its fixed
 // points r = map(r - rho u) are the solutions of the contact law, for any rho > 0.
 #pragma once
 
@@ -26,31 +26,31 @@ typename Cone::Vec alart_curnier_projection(const Cone& cone, const typename Con
     result.setZero();
     return result;
   }
-  for (int g = 0; g < Cone::groups; ++g) {
-    constexpr int size = Cone::group_size;
-    double* const part = &result[1 + g * size];
+  for_each_group<Cone>([&](auto g) {
+    constexpr int size = Cone::size(g);
+    double* const part = &result[Cone::start(g)];
     const double norm = part_norm<size>(part);
     const double radius = cone.coefficient(g) * z[0];
-    if (!(norm > radius)) continue;
+    if (!(norm > radius)) return;
     for (int k = 0; k < size; ++k) part[k] *= radius / norm;
-  }
+  });
   return result;
 }
 
 /// An element of the generalised Jacobian of alart_curnier_projection at z.
 template <class Cone>
 ContactMatrix<Cone::dim> alart_curnier_jacobian(const Cone& cone, const typename Cone::Vec& z) {
-  constexpr int size = Cone::group_size;
   ContactMatrix<Cone::dim> jacobian;
   jacobian.setZero();
   if (!(z[0] > 0)) return jacobian;
   jacobian(0, 0) = 1;
-  for (int g = 0; g < Cone::groups; ++g) {
-    const int at = 1 + g * size;
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int size = Cone::size(g);
     const double norm = part_norm<size>(&z[at]);
     const double mu = cone.coefficient(g);
     for (int k = at; k < at + size; ++k) jacobian(k, k) = 1;
-    if (norm <= mu * z[0]) continue;
+    if (norm <= mu * z[0]) return;
     for (int col = at; col < at + size; ++col) {
       for (int row = at; row < at + size; ++row) {
         jacobian(row, col) -= z[row] / norm * (z[col] / norm);
@@ -58,7 +58,7 @@ ContactMatrix<Cone::dim> alart_curnier_jacobian(const Cone& cone, const typename
       }
       jacobian(col, 0) = mu * (z[col] / norm);
     }
-  }
+  });
   return jacobian;
 }
 

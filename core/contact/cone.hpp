@@ -11,6 +11,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <type_traits>
+#include <utility>
 
 #include "friction.hpp"
 
@@ -30,6 +32,15 @@ struct NaturalPoint {
   Vec map;
   ContactStatus status;
 };
+
+/// Calls visit(g) for each group of tangential components, with g as a constant: Cone::start(g) is
+/// its first component, and Cone::size(g) their number.
+template <class Cone, class Visit>
+void for_each_group(const Visit& visit) {
+  [&]<int... g>(std::integer_sequence<int, g...>) {
+    (visit(std::integral_constant<int, g>{}), ...);
+  }(std::make_integer_sequence<int, Cone::groups>{});
+}
 
 /// A norm; 0 if it is no more than `slack`.
 template <class Real>

@@ -25,7 +25,7 @@ ContactFunction<Cone> contact_function(ContactFunctionKind kind) {
     case ContactFunctionKind::fischer_burmeister:
       if constexpr (Cone::groups == 1) return entry<FischerBurmeister<Cone>, Cone>();
   }
-  throw Error(ErrorKind::unsuitable, "is not known for rolling contacts",
+  throw Error(ErrorKind::unsuitable, "is not known for contacts with rolling or spin friction",
               "the function of Fischer & Burmeister");
 }
 

@@ -31,20 +31,19 @@ template <class ConeType, bool predicted>
 struct DiskFunction {
   using Cone = ConeType;
   static constexpr int D = Cone::dim;
-  static constexpr int S = Cone::group_size;
   static constexpr bool split = true;
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<D>;
-  using Part = Eigen::Matrix<double, S, 1>;
 
   static Vec value(const Cone& cone, const Vec& rho, const Vec& u, const Vec& r) {
     const Vec z = r - rho.cwiseProduct(u);
     Vec f = r;
     if (z[0] > 0) f[0] = rho[0] * u[0];
     const double base = predicted ? z[0] : r[0];
-    for (int g = 0; g < Cone::groups; ++g) {
-      const int at = 1 + g * S;
-      const Part part = z.template segment<S>(at);
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int S = Cone::size(g);
+      const ContactVector<S> part = z.template segment<S>(at);
       const double norm = part.norm();
       const double radius = cone.coefficient(g) * std::max(base, 0.0);
       if (base > 0 && norm <= radius) {
@@ -52,7 +51,7 @@ struct DiskFunction {
       } else if (radius > 0) {
         f.template segment<S>(at) -= (radius / norm) * part;
       }
-    }
+    });
     return f;
   }
 
@@ -67,9 +66,10 @@ struct DiskFunction {
     }
     const double base = predicted ? z[0] : r[0];
     if (!(base > 0)) return;
-    for (int g = 0; g < Cone::groups; ++g) {
-      const int at = 1 + g * S;
-      const Part part = z.template segment<S>(at);
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int S = Cone::size(g);
+      const ContactVector<S> part = z.template segment<S>(at);
       const double norm = part.norm();
       const double mu = cone.coefficient(g);
       auto own = B.template block<S, S>(at, at);
@@ -77,10 +77,10 @@ struct DiskFunction {
       if (norm <= mu * base) {
         own.setZero();
         other = rho.template segment<S>(at).asDiagonal();
-        continue;
+        return;
       }
       // the projection of `part` on the disk: mu base part / ||part||
-      const Part direction = part / norm;
+      const ContactVector<S> direction = part / norm;
       Eigen::Matrix<double, S, S> jacobian = Eigen::Matrix<double, S, S>::Identity();
       jacobian -= direction * direction.transpose();
       jacobian *= mu * base / norm;
@@ -88,7 +88,7 @@ struct DiskFunction {
       other = jacobian * rho.template segment<S>(at).asDiagonal();
       B.template block<S, 1>(at, 0) = -mu * direction;
       if (predicted) A.template block<S, 1>(at, 0) = mu * rho[0] * direction;
-    }
+    });
   }
 };
 
@@ -100,22 +100,22 @@ using JeanMoreau = DiskFunction<Cone, false>;
 /// The derivative of u^ by u. It is zero at the kink of the norm.
 template <class Cone>
 ContactMatrix<Cone::dim> modified_jacobian(const Cone& cone, const typename Cone::Vec& u) {
-  constexpr int S = Cone::group_size;
   ContactMatrix<Cone::dim> jacobian = ContactMatrix<Cone::dim>::Identity();
-  for (int g = 0; g < Cone::groups; ++g) {
-    const auto part = u.template segment<S>(1 + g * S);
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int S = Cone::size(g);
+    const auto part = u.template segment<S>(at);
     const double norm = part.norm();
     if (norm > 0) {
-      jacobian.template block<1, S>(0, 1 + g * S) = (cone.coefficient(g) / norm) * part.transpose();
+      jacobian.template block<1, S>(0, at) = (cone.coefficient(g) / norm) * part.transpose();
     }
-  }
+  });
   return jacobian;
 }
 
 /// An element of the generalised Jacobian of P_K at z.
 template <class Cone>
 ContactMatrix<Cone::dim> projection_jacobian(const Cone& cone, const typename Cone::Vec& z) {
-  constexpr int S = Cone::group_size;
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<Cone::dim>;
   const Vec p = cone.project(z);
@@ -124,29 +124,31 @@ ContactMatrix<Cone::dim> projection_jacobian(const Cone& cone, const typename Co
   // p_N = (z_N + sum mu_g ||z_g||) / (1 + sum mu_g^2) over the groups whose limit binds
   Vec normal = Vec::Unit(0);
   double weight = 1;
-  for (int g = 0; g < Cone::groups; ++g) {
-    const int at = 1 + g * S;
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int S = Cone::size(g);
     const double mu = cone.coefficient(g);
     const double norm = z.template segment<S>(at).norm();
     if (norm > mu * p[0]) {
       normal.template segment<S>(at) = (mu / norm) * z.template segment<S>(at);
       weight += mu * mu;
     }
-  }
+  });
   normal /= weight;
   Mat jacobian = Mat::Identity();
   jacobian.row(0) = normal.transpose();
-  for (int g = 0; g < Cone::groups; ++g) {
-    const int at = 1 + g * S;
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int S = Cone::size(g);
     const double mu = cone.coefficient(g);
     const double norm = z.template segment<S>(at).norm();
-    if (!(norm > mu * p[0])) continue;
+    if (!(norm > mu * p[0])) return;
     const Eigen::Matrix<double, S, 1> direction = z.template segment<S>(at) / norm;
     auto own = jacobian.template block<S, S>(at, at);
     own -= direction * direction.transpose();
     own *= mu * p[0] / norm;
     jacobian.template middleRows<S>(at) += (mu * direction) * normal.transpose();
-  }
+  });
   return jacobian;
 }
 
@@ -290,7 +292,8 @@ struct ContactFunction {
   bool split = false;  ///< whether each component has a rho of its own
 };
 
-/// Throws Error (unsuitable) if Fischer & Burmeister's function is asked for on a rolling cone.
+/// Throws Error (unsuitable) if Fischer & Burmeister's function is asked for on a cone
+/// of more than one group.
 template <class Cone>
 ContactFunction<Cone> contact_function(ContactFunctionKind kind);
 

@@ -1,4 +1,5 @@
-// The Coulomb cone K = { ||r_T|| <= mu r_N } of one contact, in d = 2 or 3 dimensions.
+// The Coulomb cone K = { ||r_T|| <= mu r_N } of one contact, in d = 2 or 3 dimensions. With d = 4
+// it is the cone of reduced/round.hpp.
 //
 //   u^ = u + [mu ||u_T||, 0, 0]
 #pragma once
@@ -13,8 +14,10 @@ template <int D, class Real = double>
 class Coulomb {
  public:
   static constexpr int dim = D;
-  static constexpr int groups = 1;          // of tangential components, each with its own limit
-  static constexpr int group_size = D - 1;  // components of a group
+  static constexpr int groups = 1;   // of tangential components, each with its own limit
+  static constexpr int lengths = D;  // N and T are lengths, see Friction
+  static constexpr int start(int /*group*/) { return 1; }
+  static constexpr int size(int /*group*/) { return D - 1; }
   using Vec = ContactVector<D, Real>;
   using Slack = std::array<Real, groups>;
 
@@ -30,6 +33,8 @@ class Coulomb {
     if constexpr (D == 2) {
       using std::abs;  // or that of Real
       return abs(x[1]);
+    } else if constexpr (D > 3) {
+      return x.template tail<D - 1>().norm();
     } else {
       // by components: if components were just stored, a vector load of them stalls
       using std::sqrt;  // or that of Real

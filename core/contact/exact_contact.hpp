@@ -27,6 +27,8 @@ namespace fclib {
 
 template <int D>
 class ExactContact {
+  static_assert(D == 2 || D == 3);
+
  public:
   using Vec = ContactVector<D>;
   using Mat = ContactMatrix<D>;

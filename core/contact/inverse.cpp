@@ -2,6 +2,8 @@
 
 #include <Eigen/LU>
 
+#include "contact/cones.hpp"
+
 namespace fclib {
 
 template <int D>
@@ -17,9 +19,7 @@ double determinant(const ContactMatrix<D>& a) {
 #define FCLIB_INSTANTIATE(D)                                     \
   template ContactMatrix<D> inverse<D>(const ContactMatrix<D>&); \
   template double determinant<D>(const ContactMatrix<D>&);
-FCLIB_INSTANTIATE(2)
-FCLIB_INSTANTIATE(3)
-FCLIB_INSTANTIATE(5)
+FCLIB_FOR_EACH_DIMENSION(FCLIB_INSTANTIATE)
 #undef FCLIB_INSTANTIATE
 
 }  // namespace fclib

@@ -6,7 +6,7 @@
 
 namespace fclib {
 
-/// For D = 2, 3, 5.
+/// For each D of FCLIB_FOR_EACH_DIMENSION.
 template <int D>
 ContactMatrix<D> inverse(const ContactMatrix<D>& a);
 template <int D>

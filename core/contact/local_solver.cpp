@@ -10,7 +10,6 @@ namespace fclib {
 template <class Cone>
 bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
                       const typename Cone::Vec& b, typename Cone::Vec& r) {
-  constexpr int size = Cone::group_size;
   constexpr int D = Cone::dim;
   typename Cone::Vec next = r;
   typename Cone::Vec u = detail::affine<D>(a, r, b);
@@ -18,8 +17,10 @@ bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   next[0] = std::max(0.0, r[0] - u[0] / a(0, 0));
   const double moved = next[0] - r[0];
   for (int k = 0; k < D; ++k) u[k] += a(k, 0) * moved;
-  for (int g = 0; g < Cone::groups; ++g) {
-    const int at = 1 + g * size;
+  bool possible = true;
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int size = Cone::size(g);
     // the norm of the block: a step of 1 / norm never overshoots
     double norm = 0;
     for (int row = at; row < at + size; ++row) {
@@ -27,7 +28,8 @@ bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
       for (int col = at; col < at + size; ++col) sum += std::abs(a(row, col));
       norm = std::max(norm, sum);
     }
-    if (!(norm > 0)) return false;
+    possible = possible && norm > 0;
+    if (!possible) return;
     for (int k = at; k < at + size; ++k) next[k] -= u[k] / norm;
     const double radius = cone.coefficient(g) * next[0];
     const double length = part_norm<size>(&next[at]);
@@ -38,9 +40,9 @@ bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
       for (int col = at; col < at + size; ++col) sum += a(row, col) * (next[col] - r[col]);
       u[row] += sum;
     }
-  }
-  r = next;
-  return true;
+  });
+  if (possible) r = next;
+  return possible;
 }
 
 template <class Cone>

@@ -105,13 +105,13 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   }
   Vec steps;
   steps[0] = 1 / a(0, 0);
-  for (int g = 0; g < Cone::groups; ++g) {
-    constexpr int size = Cone::group_size;
-    const int at = 1 + g * size;
+  for_each_group<Cone>([&](auto g) {
+    constexpr int at = Cone::start(g);
+    constexpr int size = Cone::size(g);
     double trace = 0;
     for (int k = at; k < at + size; ++k) trace += a(k, k);
     for (int k = at; k < at + size; ++k) steps[k] = size / trace;
-  }
+  });
   for (int k = 0; k < D; ++k) {
     if (!(steps[k] > 0) || !std::isfinite(steps[k])) return false;
   }

@@ -22,8 +22,10 @@ class Rolling {
 
  public:
   static constexpr int dim = D;
-  static constexpr int groups = 2;      // sliding, rolling
-  static constexpr int group_size = T;  // components of a group
+  static constexpr int groups = 2;       // sliding, rolling
+  static constexpr int lengths = 1 + T;  // N and T are lengths, see Friction
+  static constexpr int start(int group) { return 1 + group * T; }
+  static constexpr int size(int /*group*/) { return T; }
   using Vec = ContactVector<D, Real>;
   using Slack = std::array<Real, groups>;
 

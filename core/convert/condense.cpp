@@ -72,8 +72,4 @@ LocalProblem condense(const GlobalProblem& problem) {
   return local;
 }
 
-LocalRollingProblem condense(const GlobalRollingProblem& problem) {
-  return {condense(static_cast<const GlobalProblem&>(problem)), problem.mu_r};
-}
-
 }  // namespace fclib

@@ -35,6 +35,14 @@ class Condensation {
 /// The local form of a global problem (M3DFC from GM3DFC). If its joints contradict each other only
 /// by rounding, they are made to agree (joints/consistent.hpp).
 LocalProblem condense(const GlobalProblem& problem);
-LocalRollingProblem condense(const GlobalRollingProblem& problem);
+/// ... and with another law than Coulomb's.
+template <class P>
+  requires(std::derived_from<P, GlobalProblem> && !std::same_as<P, GlobalProblem>)
+LocalFormOf<P> condense(const P& problem) {
+  LocalFormOf<P> local;
+  static_cast<LocalProblem&>(local) = condense(static_cast<const GlobalProblem&>(problem));
+  copy_law(problem, local);
+  return local;
+}
 
 }  // namespace fclib

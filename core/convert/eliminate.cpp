@@ -351,8 +351,4 @@ LocalProblem eliminate(const LocalProblem& problem) {
   return elimination.plain();
 }
 
-LocalRollingProblem eliminate(const LocalRollingProblem& problem) {
-  return {eliminate(static_cast<const LocalProblem&>(problem)), problem.mu_r};
-}
-
 }  // namespace fclib

@@ -84,6 +84,12 @@ class Elimination {
 /// The local problem without bilateral constraints, or the problem itself if it has none. Throws
 /// Error (unsuitable) if R is singular, or if constraints contradict each other.
 LocalProblem eliminate(const LocalProblem& problem);
-LocalRollingProblem eliminate(const LocalRollingProblem& problem);
+template <class P>
+  requires(std::derived_from<P, LocalProblem> && !std::same_as<P, LocalProblem>)
+P eliminate(const P& problem) {
+  P plain = problem;
+  static_cast<LocalProblem&>(plain) = eliminate(static_cast<const LocalProblem&>(problem));
+  return plain;
+}
 
 }  // namespace fclib

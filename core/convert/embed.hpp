@@ -16,7 +16,7 @@ namespace fclib {
 template <class P>
 Arrangement spatial_places(const P& planar) {
   const auto [d, spatial] = P::dimensions;
-  if (planar.spacedim != d) {
+  if (P::spin || planar.spacedim != d) {  // nothing spins in the plane
     throw Error(ErrorKind::unsuitable,
                 "is " + std::to_string(planar.spacedim) + ", the problem is not planar",
                 "/" + group_name<P>() + "/spacedim");

@@ -1,6 +1,6 @@
 // Problems in other units. A velocity of 1 becomes `velocity`, an impulse of 1 becomes `impulse`
-// and, with rolling friction, a length of 1 becomes `length` (r_R are angular impulses, u_R angular
-// velocities): with D = (1, ..., 1) and length for the rolling components,
+// and, with rolling or spin friction, a length of 1 becomes `length` (r_R and r_S are angular
+// impulses, u_R and u_S angular velocities): with D = (1, ..., 1) and length for these components,
 //
 //   u' = velocity D^-1 u,  r' = impulse D r,  W' = velocity / impulse D^-1 W D^-1,  H' = H D^-1,
 //
@@ -35,15 +35,14 @@ inline double factor(std::string_view unit, const Scaling& scaling) {
   return 1;
 }
 
-/// The factors of the components of all contacts: 1, and length for the rolling ones.
+/// The factors of the components of all contacts: 1, and length for the angular ones.
 template <class P>
 Vector lever(const P& problem, const Scaling& scaling) {
   const Index d = problem.spacedim;
   Vector result = Vector::Ones(problem.size(Dim::m));
-  if constexpr (P::rolling) {
-    for (Index k = 0; k < static_cast<Index>(result.size()); ++k) {
-      if (k % d > (d - 1) / 2) result[k] = scaling.length;
-    }
+  const Index lengths = friction_of(problem).lengths(d);
+  for (Index k = 0; k < static_cast<Index>(result.size()); ++k) {
+    if (k % d >= lengths) result[k] = scaling.length;
   }
   return result;
 }

@@ -13,11 +13,11 @@
 //   W given (Dense)             (I + D W) dp = -F
 //   W = B B^T given (Bodies)    (I + B^T D B) dv = -B^T F,  dp = -F - D B dv,  B = J M^-1/2
 //
-// A sweep of Gauss-Seidel goes from contact to contact. Here every lane has its contacts, and all of
-// them work at once: that is why a GPU has this method and not the one of small_solver.hpp.
+// A sweep of Gauss-Seidel goes from contact to contact. Here every lane has its contacts, and all
+// of them work at once: that is why a GPU has this method and not the one of small_solver.hpp.
 //
-// The groups of a warp go through the same statements in step: what differs between problems is data
-// and never a branch around a `sync`. `Group::anyone` asks all groups that run in step.
+// The groups of a warp go through the same statements in step: what differs between problems is
+// data and never a branch around a `sync`. `Group::anyone` asks all groups that run in step.
 #pragma once
 
 #ifndef __CUDACC_RTC__
@@ -66,9 +66,9 @@ enum class Ending {
   invalid,    ///< an entry that is not finite, or a negative mu
 };
 
-/// kappa and the factors of its growth are those of ppa-nsn with a smaller kappa to begin with: from 1
-/// to 30, problems of 4 to 64 contacts take the same number of Newton steps within a tenth, and more
-/// from 100 on.
+/// kappa and the factors of its growth are those of ppa-nsn with a smaller kappa to begin with:
+/// from 1 to 30, problems of 4 to 64 contacts take the same number of Newton steps within a tenth,
+/// and more from 100 on.
 struct Rules {
   double tolerance = 1e-8;
   double kappa = 10;
@@ -81,7 +81,7 @@ struct Rules {
 struct Answer {
   Ending ending = Ending::unsolved;
   double error = FCLIB_INFINITY;  ///< the larger of both maps
-  int steps = 0;            ///< of Newton's method
+  int steps = 0;                  ///< of Newton's method
 };
 
 // ---- the contact law: Coulomb, or Coulomb with rolling; `Groups` of tangential components
@@ -166,8 +166,8 @@ struct Law {
     }
   }
 
-  /// ||r - P_K(r - rho u^)||^2, as contact/coulomb.hpp and contact/rolling.hpp have it. Sliding that is
-  /// not faster than `slip` is none.
+  /// ||r - P_K(r - rho u^)||^2, as contact/coulomb.hpp and contact/rolling.hpp have it. Sliding
+  /// that is not faster than `slip` is none.
   FCLIB_LANES double natural_square(const double* u, const double* r, double rho,
                                     double slip) const {
     double y[dim], map[dim], left[groups], length[groups], speed[groups];
@@ -319,8 +319,8 @@ struct Block {
 
 // ---- linear equations
 
-/// A block of 3, inverted: the inverse is d times the entries i. `block` has `next` entries from a row to the
-/// next.
+/// A block of 3, inverted: the inverse is d times the entries i. `block` has `next` entries from a
+/// row to the next.
 struct Inverse {
   double i00, i01, i02, i10, i11, i12, i20, i21, i22, d;
 
@@ -345,9 +345,9 @@ struct Inverse {
 /// n, up to a multiple of 3.
 FCLIB_LANES constexpr int padded(int n) { return (n + 2) / 3 * 3; }
 
-/// Solves S x = b, n a multiple of 3: S (n x n) by columns of length `ld`, b in column n, where x comes
-/// to stand. Gauss-Jordan elimination by blocks of 3, without pivots. If that loses digits, the next
-/// residual of Newton's method shows it, and kappa falls.
+/// Solves S x = b, n a multiple of 3: S (n x n) by columns of length `ld`, b in column n, where x
+/// comes to stand. Gauss-Jordan elimination by blocks of 3, without pivots. If that loses digits,
+/// the next residual of Newton's method shows it, and kappa falls.
 template <class Group>
 FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
   // lanes: rows, and parts of the columns if there are more lanes than rows
@@ -387,9 +387,9 @@ FCLIB_LANES void eliminate(const Group& group, double* S, int n, int ld) {
 //
 // A system has the memory that the lanes of a group share. It offers
 //
-//   take      reads a problem: whether all entries are finite, q and the mean |W_kk| of each contact
-//   product   y = W x of the lane's contacts
-//   put       F and D of a contact; solve then gives the Newton step dp of the lane's contacts
+//   take      reads a problem: whether all entries are finite, q and the mean |W_kk| of each
+//   contact product   y = W x of the lane's contacts put       F and D of a contact; solve then
+//   gives the Newton step dp of the lane's contacts
 //
 // The contacts of a lane are lane, lane + size, ...
 
@@ -413,8 +413,8 @@ struct Shared : Count<Fixed> {
   static constexpr int D = Law::dim;
 
   Group group;
-  double* x;        // (D nc) what contacts tell one another
-  double* slopes;   // (D D nc) D of each contact, by rows
+  double* x;       // (D nc) what contacts tell one another
+  double* slopes;  // (D D nc) D of each contact, by rows
 
   FCLIB_LANES static constexpr int room(int most_contacts) { return (D + D * D) * most_contacts; }
   FCLIB_LANES double* place(double* at, int most_contacts) {
@@ -444,18 +444,18 @@ struct Dense : Shared<Law, Group> {
 
   /// One problem of the caller.
   struct Given {
-    const double* W;    ///< (m x m) by columns; by rows if it is copied. Blocks: each by rows
-    const double* q;    ///< (m)
-    const int* starts;  ///< of blocks: (nc + 1) the first block of each contact, and
+    const double* W;     ///< (m x m) by columns; by rows if it is copied. Blocks: each by rows
+    const double* q;     ///< (m)
+    const int* starts;   ///< of blocks: (nc + 1) the first block of each contact, and
     const int* columns;  ///< the contact of each block's columns; the diagonal is among them
   };
 
   const double* W = nullptr;  // (m x m) by columns, or the blocks
   const int* starts = nullptr;
   const int* columns = nullptr;
-  double* copy = nullptr;     // of W, or null
-  double* S;                  // (n x n + 1), n = padded(m)
-  double* known;              // (m) the right-hand sides
+  double* copy = nullptr;  // of W, or null
+  double* S;               // (n x n + 1), n = padded(m)
+  double* known;           // (m) the right-hand sides
   int ld;
   int* place_of;  // (nc) of a contact in the Newton system; -1 if it is open
 
@@ -885,7 +885,8 @@ struct Bodies : Shared<Law, Group> {
     group.sync();
   }
 
-  /// K = I + B^T D B. Each lane has its rows; if there are more lanes, each has some columns of a row.
+  /// K = I + B^T D B. Each lane has its rows; if there are more lanes, each has some columns of a
+  /// row.
   FCLIB_LANES void fill(int n) {
     int rows = Group::size;
     while (rows > 1 && rows / 2 >= n) rows /= 2;
@@ -920,8 +921,8 @@ struct Bodies : Shared<Law, Group> {
   }
 };
 
-/// J of problems with few coordinates, `Nv`, all of which a contact may touch. A lane keeps its rows of K
-/// in registers; the rows that are eliminated go through shared memory.
+/// J of problems with few coordinates, `Nv`, all of which a contact may touch. A lane keeps its
+/// rows of K in registers; the rows that are eliminated go through shared memory.
 template <class Law, class Group, int Nv, int Fixed = 0>
 struct FewCoordinates : Shared<Law, Group, Fixed> {
   using Base = Shared<Law, Group, Fixed>;
@@ -932,8 +933,8 @@ struct FewCoordinates : Shared<Law, Group, Fixed> {
   using Base::x;
   using Given = typename Bodies<Law, Group>::Given;
 
-  static constexpr int N = padded(Nv);    // the columns of B from Nv on are 0
-  static constexpr int together = 3;      // columns that are read at once; more take registers
+  static constexpr int N = padded(Nv);        // the columns of B from Nv on are 0
+  static constexpr int together = 3;          // columns that are read at once; more take registers
   static constexpr int stride = (D * N) | 1;  // of a contact in B, as in Bodies
   static constexpr int rows = (N + Group::size - 1) / Group::size;  // of a lane
 
@@ -1060,7 +1061,8 @@ struct FewCoordinates : Shared<Law, Group, Fixed> {
           for (int l = 0; l < D; ++l) t[row][l] += b * slope[D * k + l];
         }
       }
-      if (!group.anyone(slope[0] != 0)) continue;
+      if (slope[0] == 0)
+        continue;  // no word to the other groups here: they may have fewer contacts
       FCLIB_UNROLL
       for (int j = 0; j < N; ++j) {
         FCLIB_UNROLL
@@ -1119,8 +1121,8 @@ struct FewCoordinates : Shared<Law, Group, Fixed> {
         const double f2 = x0 * of.i02 + x1 * of.i12 + x2 * of.i22;
         FCLIB_UNROLL
         for (int j = k + 3; j <= N; ++j) {
-          K[row][j] = (pivot ? 0.0 : K[row][j]) - (f0 * block[j] + f1 * block[N + 1 + j] +
-                                                   f2 * block[2 * (N + 1) + j]);
+          K[row][j] = (pivot ? 0.0 : K[row][j]) -
+                      (f0 * block[j] + f1 * block[N + 1 + j] + f2 * block[2 * (N + 1) + j]);
         }
       }
     }
@@ -1226,10 +1228,10 @@ class Solver {
   }
   [[nodiscard]] FCLIB_LANES const Answer& answer() const { return answer_; }
 
-  /// One step of Newton's method. Before it, the proximal step that the last one may have finished is
-  /// judged, or the guess.
+  /// One step of Newton's method. Before it, the proximal step that the last one may have finished
+  /// is judged, or the guess.
   FCLIB_LANES void advance(bool mine) {
-    const bool candidate = mine && state_ != State::inside;
+    const bool candidate = mine && !finished() && state_ != State::inside;
     if (system.group.anyone(candidate)) judge_candidate(candidate);
     const bool solving = mine && !finished();
     if (system.group.anyone(solving)) newton_step(solving);
@@ -1263,8 +1265,8 @@ class Solver {
     if (!mine) return;
     const bool begun = state_ == State::begun;
     state_ = State::inside;
-    const bool taken = begun || gap <= 0.1 * error || gap <= 1e-15 || exact_ ||
-                       error <= rules.tolerance;
+    const bool taken =
+        begun || gap <= 0.1 * error || gap <= 1e-15 || exact_ || error <= rules.tolerance;
     if (taken) {
       copy(x, r_);
       copy(ux, u_);
@@ -1450,8 +1452,8 @@ class Solver {
   Law law_[Own];
   double rho_[Own];
   double q_[Own][D];
-  double r_[Own][D], u_[Own][D];    // the last proximal step
-  double p_[Own][D], up_[Own][D];   // the last Newton step
+  double r_[Own][D], u_[Own][D];   // the last proximal step
+  double p_[Own][D], up_[Own][D];  // the last Newton step
   double kappa_ = 1, first_ = 0, mean_ = 0, scale_ = 1, scaled_scale_ = 1;
   int inner_ = 0, rises_ = 0, cautious_ = 0;
   bool exact_ = false;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "linalg/with_dimension.hpp"
+
 namespace fclib {
 
 namespace {
@@ -13,13 +15,7 @@ constexpr std::size_t dense_limit = 128;
 }  // namespace
 
 BlockMatrix::BlockMatrix(const Matrix& a, int d) : d_(d), nc_(a.rows / d) {
-  if (d == 2) {
-    fill<2>(a);
-  } else if (d == 3) {
-    fill<3>(a);
-  } else {
-    fill<5>(a);
-  }
+  with_dimension(d, [&](auto D) { fill<D>(a); });
 }
 
 template <int D>
@@ -126,26 +122,14 @@ void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y,
     return in_parts(workers, nc_, [&](std::int64_t from, std::int64_t to) {
       const auto first = static_cast<Index>(from);
       const auto last = static_cast<Index>(to);
-      if (d_ == 2) {
-        multiply_rows<2>(first, last, x, q, y);
-      } else if (d_ == 3) {
-        multiply_rows<3>(first, last, x, q, y);
-      } else {
-        multiply_rows<5>(first, last, x, q, y);
-      }
+      with_dimension(d_, [&](auto D) { multiply_rows<D>(first, last, x, q, y); });
     });
   }
   y = q;
   for (Index contact = 0; contact < nc_; ++contact) {
     const double* part = x.data() + std::ptrdiff_t{d_} * contact;
     if (std::all_of(part, part + d_, [](double value) { return value == 0; })) continue;
-    if (d_ == 2) {
-      add_column<2>(contact, part, y.data());
-    } else if (d_ == 3) {
-      add_column<3>(contact, part, y.data());
-    } else {
-      add_column<5>(contact, part, y.data());
-    }
+    with_dimension(d_, [&](auto D) { add_column<D>(contact, part, y.data()); });
   }
 }
 

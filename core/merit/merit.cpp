@@ -4,8 +4,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "contact/coulomb.hpp"
-#include "contact/rolling.hpp"
+#include "contact/laws.hpp"
 #include "error_size.hpp"
 #include "joints/consistent.hpp"
 #include "merit/equations.hpp"
@@ -20,7 +19,7 @@ using std::abs, std::sqrt;  // or those of Real
 void raise(double& largest, const Real& value) { largest = larger_error(largest, value); }
 
 /// The rounding of the velocities that friction opposes, by slip_of_rounding. The normal velocity
-/// counts as one of the sliding ones. Rolling velocities have units of their own.
+/// counts as one of the sliding ones. Angular velocities have units of their own.
 template <class Cone>
 class SlipOfRounding {
  public:
@@ -28,24 +27,23 @@ class SlipOfRounding {
     const Eigen::Index contacts = sizes.size() / Cone::dim;
     mean_.fill(Real(0));
     for (Eigen::Index contact = 0; contact < contacts; ++contact) {
-      for (int g = 0; g < Cone::groups; ++g) mean_[g] += square(contact, g);
+      for_each_group<Cone>([&](auto g) { mean_[g] += square(contact, g); });
     }
     for (Real& mean : mean_) mean = sqrt(mean / static_cast<double>(contacts));
   }
 
   [[nodiscard]] typename Cone::Slack of(Eigen::Index contact) const {
     typename Cone::Slack result;
-    for (int g = 0; g < Cone::groups; ++g) {
-      result[g] = slip_of_rounding<Real>(sqrt(square(contact, g)), mean_[g]);
-    }
+    for_each_group<Cone>(
+        [&](auto g) { result[g] = slip_of_rounding<Real>(sqrt(square(contact, g)), mean_[g]); });
     return result;
   }
 
  private:
-  [[nodiscard]] Real square(Eigen::Index contact, int g) const {
-    constexpr int S = Cone::group_size;
+  template <int g>
+  [[nodiscard]] Real square(Eigen::Index contact, std::integral_constant<int, g>) const {
     const Eigen::Index at = Cone::dim * contact;
-    const Real sum = sizes_.template segment<S>(at + 1 + S * g).squaredNorm();
+    const Real sum = sizes_.template segment<Cone::size(g)>(at + Cone::start(g)).squaredNorm();
     return g == 0 ? sum + sizes_[at] * sizes_[at] : sum;
   }
 
@@ -109,18 +107,9 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution, 
                                             : result.bilateral;
     member = larger_error(member, mismatch.error);
   }
-  const auto by_contacts = [&]<class Cone>(std::type_identity<Cone>) {
+  with_cone<Real>(spacedim, friction, [&]<class Cone>() {
     judge_contacts<Cone>(friction, solution.r, own, equations, result, each);
-  };
-  if (spacedim == 2) {
-    by_contacts(std::type_identity<Coulomb<2, Real>>{});
-  } else if (spacedim == 5) {
-    by_contacts(std::type_identity<Rolling<5, Real>>{});
-  } else if (friction.mu_r.size() > 0) {
-    by_contacts(std::type_identity<Rolling<3, Real>>{});
-  } else {
-    by_contacts(std::type_identity<Coulomb<3, Real>>{});
-  }
+  });
   result.error = larger_error(result.error_by(MeritKind::natural), result.scaled_natural);
   return result;
 }
@@ -173,26 +162,18 @@ double judge_and_complete(Index spacedim, const Friction& friction, const OwnSiz
   return error;
 }
 
+}  // namespace
+
 template <class P>
-ContactMerits judge_each(const P& problem, const Solution& solution) {
+Merit merit(const P& problem, const Solution& solution) {
+  return judge_valid(problem, solution);
+}
+
+template <class P>
+ContactMerits contact_merits(const P& problem, const Solution& solution) {
   ContactMerits each;
   judge_valid(problem, solution, each);
   return each;
-}
-
-}  // namespace
-
-Merit merit(const LocalProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-Merit merit(const LocalRollingProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-Merit merit(const GlobalProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
 }
 
 double judge_and_complete(const LocalProblem& problem, const Friction& friction,
@@ -210,17 +191,10 @@ double judge_and_complete(const GlobalProblem& problem, const Friction& friction
                             equations(problem, solution, mass, own), kind, solution);
 }
 
-ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {
-  return judge_each(problem, solution);
-}
-ContactMerits contact_merits(const LocalRollingProblem& problem, const Solution& solution) {
-  return judge_each(problem, solution);
-}
-ContactMerits contact_merits(const GlobalProblem& problem, const Solution& solution) {
-  return judge_each(problem, solution);
-}
-ContactMerits contact_merits(const GlobalRollingProblem& problem, const Solution& solution) {
-  return judge_each(problem, solution);
-}
+#define FCLIB_INSTANTIATE(P)                          \
+  template Merit merit<P>(const P&, const Solution&); \
+  template ContactMerits contact_merits<P>(const P&, const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
 
 }  // namespace fclib

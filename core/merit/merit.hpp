@@ -113,10 +113,8 @@ struct ContactMerits {
 ///
 /// Throws Error (problem) if the problem or the solution is not valid, (unsuitable) if M is
 /// singular.
-Merit merit(const LocalProblem& problem, const Solution& solution);
-Merit merit(const LocalRollingProblem& problem, const Solution& solution);
-Merit merit(const GlobalProblem& problem, const Solution& solution);
-Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
+template <class P>
+Merit merit(const P& problem, const Solution& solution);
 
 /// The error that a tolerance bounds, for a valid problem and a valid solution, in a loop: the
 /// caller gives what depends on the problem alone. u is not judged: it is replaced by the one that
@@ -128,9 +126,13 @@ double judge_and_complete(const GlobalProblem& problem, const Friction& friction
                           Solution& solution);
 
 /// Like merit(); it throws the same errors.
-ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);
-ContactMerits contact_merits(const LocalRollingProblem& problem, const Solution& solution);
-ContactMerits contact_merits(const GlobalProblem& problem, const Solution& solution);
-ContactMerits contact_merits(const GlobalRollingProblem& problem, const Solution& solution);
+template <class P>
+ContactMerits contact_merits(const P& problem, const Solution& solution);
+
+#define FCLIB_DECLARE(P)                                     \
+  extern template Merit merit<P>(const P&, const Solution&); \
+  extern template ContactMerits contact_merits<P>(const P&, const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
 
 }  // namespace fclib

@@ -2,8 +2,7 @@
 
 #include <cmath>
 
-#include "contact/coulomb.hpp"
-#include "contact/rolling.hpp"
+#include "contact/laws.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {
@@ -28,12 +27,8 @@ double natural_norm(const Friction& friction, const Vector& u, const Vector& r) 
 
 double natural_term(Index spacedim, const Friction& friction, const Vector& q, const Vector& u,
                     const Vector& r) {
-  const double norm = [&] {
-    if (spacedim == 2) return natural_norm<Coulomb<2>>(friction, u, r);
-    if (spacedim == 5) return natural_norm<Rolling<5>>(friction, u, r);
-    if (friction.mu_r.size() > 0) return natural_norm<Rolling<3>>(friction, u, r);
-    return natural_norm<Coulomb<3>>(friction, u, r);
-  }();
+  const double norm = with_cone(spacedim, friction,
+                                [&]<class Cone>() { return natural_norm<Cone>(friction, u, r); });
   return norm / (1 + std::sqrt(q.norm()));
 }
 
@@ -78,29 +73,17 @@ double judge(const GlobalProblem& problem, const Friction& friction, const Solut
   return natural_term(problem.spacedim, friction, q, u, solution.r) + others;
 }
 
+}  // namespace
+
 template <class P>
-double judge_valid(const P& problem, const Solution& solution) {
+double merit_1(const P& problem, const Solution& solution) {
   validate(problem);
   validate(solution, problem);
   return judge(problem, friction_of(problem), solution);
 }
 
-}  // namespace
-
-double merit_1(const LocalProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-
-double merit_1(const LocalRollingProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-
-double merit_1(const GlobalProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
-
-double merit_1(const GlobalRollingProblem& problem, const Solution& solution) {
-  return judge_valid(problem, solution);
-}
+#define FCLIB_INSTANTIATE(P) template double merit_1<P>(const P&, const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
 
 }  // namespace fclib

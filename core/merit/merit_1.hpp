@@ -14,9 +14,11 @@
 namespace fclib {
 
 /// MERIT_1 of (solution, problem). It requires the same as merit().
-double merit_1(const LocalProblem& problem, const Solution& solution);
-double merit_1(const LocalRollingProblem& problem, const Solution& solution);
-double merit_1(const GlobalProblem& problem, const Solution& solution);
-double merit_1(const GlobalRollingProblem& problem, const Solution& solution);
+template <class P>
+double merit_1(const P& problem, const Solution& solution);
+
+#define FCLIB_DECLARE(P) extern template double merit_1<P>(const P&, const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
 
 }  // namespace fclib

@@ -71,10 +71,10 @@ void Homotopy<Cone>::start() {
   c_ = residual_;
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Cone cone(units_.friction(), a);
-    for (int group = 0; group < Cone::groups; ++group) {
-      if (cone.coefficient(group) > 0) continue;
-      c_.template segment<T>(D * a + 1 + T * group).setZero();
-    }
+    for_each_group<Cone>([&](auto group) {
+      if (cone.coefficient(group) > 0) return;
+      c_.template segment<Cone::size(group)>(D * a + Cone::start(group)).setZero();
+    });
   }
 }
 
@@ -83,11 +83,13 @@ bool Homotopy<Cone>::inside(const Vector& r) const {
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Cone cone(units_.friction(), a);
     if (!(r[D * a] > 0)) return false;
-    for (int group = 0; group < Cone::groups; ++group) {
+    bool within = true;
+    for_each_group<Cone>([&](auto group) {
       const double mu = cone.coefficient(group);
-      if (mu > 0 && !(r.template segment<T>(D * a + 1 + T * group).norm() < mu * r[D * a]))
-        return false;
-    }
+      const auto part = r.template segment<Cone::size(group)>(D * a + Cone::start(group));
+      within = within && !(mu > 0 && !(part.norm() < mu * r[D * a]));
+    });
+    if (!within) return false;
   }
   return true;
 }
@@ -107,15 +109,16 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
     Vec dg = Vec::Zero();  // dg / dlambda
     Mat B = Mat::Zero();   // -t dg / dr
     bool any = false;
-    for (int group = 0; group < Cone::groups; ++group) {
+    for_each_group<Cone>([&](auto group) {
+      constexpr int k = Cone::start(group);
+      constexpr int T = Cone::size(group);
       const double mu = cone.coefficient(group);
-      const int k = 1 + T * group;
       if (!(mu > 0)) {
         B.template block<T, T>(k, k).setIdentity();
-        continue;
+        return;
       }
       any = true;
-      const Disc y = r.template segment<T>(at + k);
+      const ContactVector<T> y = r.template segment<T>(at + k);
       const double x = mu * r[at];
       const double norm = y.norm();
       const double det = (x - norm) * (x + norm);
@@ -135,7 +138,7 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
       B.template block<T, 1>(k, 0) = (-t * mu * 2 * x / (det * det)) * y;
       B.template block<T, T>(k, k) = (2 * t / (det * det)) * y * y.transpose();
       for (int i = 0; i < T; ++i) B(k + i, k + i) += t / det;
-    }
+    });
     if (!any) {
       g[0] = 1 / r[at];
       B(0, 0) = t / (r[at] * r[at]);
@@ -146,13 +149,13 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
     if (determinant<D>(B) < 0) negative_ = !negative_;
     Mat& inverted = inverted_[static_cast<std::size_t>(a)];
     inverted = inverse<D>(B);
-    for (int group = 0; group < Cone::groups; ++group) {
-      if (!(cone.coefficient(group) > 0)) {
-        const int k = 1 + T * group;
-        inverted.template middleRows<T>(k).setZero();
-        inverted.template middleCols<T>(k).setZero();
-      }
-    }
+    for_each_group<Cone>([&](auto group) {
+      if (cone.coefficient(group) > 0) return;
+      constexpr int k = Cone::start(group);
+      constexpr int T = Cone::size(group);
+      inverted.template middleRows<T>(k).setZero();
+      inverted.template middleCols<T>(k).setZero();
+    });
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
         units_.template block<D>(a, inverted);
   }
@@ -185,20 +188,21 @@ double Homotopy<Cone>::product(const Vector& base, Index a, const Vector& x,
   const double r = base[at];
   double sum = 0;
   bool any = false;
-  for (int group = 0; group < Cone::groups; ++group) {
+  for_each_group<Cone>([&](auto group) {
+    constexpr int T = Cone::size(group);
     const double mu = cone.coefficient(group);
-    if (!(mu > 0)) continue;
+    if (!(mu > 0)) return;
     any = true;
-    const auto k = at + 1 + T * group;
-    const Disc p = base.template segment<T>(k);
-    const Disc u = x.template segment<T>(k);
-    const Disc v = y.template segment<T>(k);
+    const auto k = at + Cone::start(group);
+    const ContactVector<T> p = base.template segment<T>(k);
+    const ContactVector<T> u = x.template segment<T>(k);
+    const ContactVector<T> v = y.template segment<T>(k);
     const double norm = p.norm();
     const double det = (mu * r - norm) * (mu * r + norm);
     const double first = mu * mu * r * x[at] - p.dot(u);
     const double second = mu * mu * r * y[at] - p.dot(v);
     sum += 2 * first * second / (det * det) - (mu * mu * x[at] * y[at] - u.dot(v)) / det;
-  }
+  });
   return any ? sum : x[at] * y[at] / (r * r);
 }
 

@@ -1,8 +1,8 @@
 // A path from the unique solution of a convex problem to a solution of Coulomb's law. It is
 // followed by its arclength, since it folds.
 //
-// With t from 1 to 0, s = 1 - t, and for each disc (mu, r_T) of a contact (one of sliding, another
-// of rolling) x = mu r_N, D = x^2 - ||r_T||^2, w = D / x:
+// With t from 1 to 0, s = 1 - t, and for each disc (mu, r_T) of a contact (of sliding, spin or
+// rolling) x = mu r_N, D = x^2 - ||r_T||^2, w = D / x:
 //
 //   F(r, t) = W r + q - t (g(r, t) + c) = 0
 //   g_N = sum mu (x - s n) / D,   g_T = -r_T / D,   n = sqrt(||r_T||^2 + e^2 w^2) - e w
@@ -47,7 +47,6 @@ template <class Cone>
 class Homotopy {
  public:
   static constexpr int D = Cone::dim;
-  static constexpr int T = Cone::group_size;
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<D>;
   using Report = FunctionRef<bool(double error, const Vector& r)>;
@@ -63,7 +62,6 @@ class Homotopy {
 
  private:
   static constexpr double least_step = 1e-7;
-  using Disc = Eigen::Matrix<double, T, 1>;
 
   bool tell(Report report);
 

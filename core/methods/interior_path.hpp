@@ -2,7 +2,7 @@
 // with x o y = tau e. The system has a regularisation delta, which falls as the steps get longer.
 //
 // A Cones class has all that depends on the cone (methods/interior_point.hpp and
-// rolling_interior_point.hpp):
+// product_interior_point.hpp):
 //
 //   void evaluate(rules)              residual and gap at the iterate
 //   double tau(), residual()          mean complementarity, ||R||_inf

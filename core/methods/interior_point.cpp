@@ -253,5 +253,6 @@ double InteriorPoint<D>::longest() const {
 
 template class InteriorPoint<2>;
 template class InteriorPoint<3>;
+template class InteriorPoint<4>;
 
 }  // namespace fclib

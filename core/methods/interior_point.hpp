@@ -126,5 +126,6 @@ class InteriorPoint {
 
 extern template class InteriorPoint<2>;
 extern template class InteriorPoint<3>;
+extern template class InteriorPoint<4>;
 
 }  // namespace fclib

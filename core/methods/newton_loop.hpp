@@ -27,9 +27,10 @@ struct NewtonOptions : NewtonRules {
                "as much as r."),
         option("rho", &O::rho, "1/[W] if the rule is constant, else 1", {1e-12, 1e12},
                "rho itself, or a factor on what the rule gives."),
-        choice("line_search", &O::line_search, line_searches,
-               "armijo and goldstein_price search on 1/2 ||F||^2. fischer_burmeister is armijo on "
-               "the merit of that function; for rolling contacts it is armijo."),
+        choice(
+            "line_search", &O::line_search, line_searches,
+            "armijo and goldstein_price search on 1/2 ||F||^2. fischer_burmeister is armijo on "
+            "the merit of that function; for contacts with rolling or spin friction it is armijo."),
         option("regularisation", &O::regularisation, "mean of tr(W_aa) / d", {0, 1e6},
                "What is added to the diagonal of W in Newton's system. It is multiplied by the "
                "error if that is less than 1."),

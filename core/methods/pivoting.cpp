@@ -1,6 +1,7 @@
 #include "methods/pivoting.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -24,12 +25,19 @@ constexpr double tie = 1e-13;
 
 template <class Cone>
 Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(problem) {
-  constexpr int size = Cone::group_size;
   const Eigen::Index nc = problem.nc();
   const Eigen::Index m = problem.m();
-  const int corners = size == 1 ? 2 : edges;
+  // the corners of each group's disc, which is a segment if it has one component
+  std::array<int, Cone::groups> corners;
+  std::array<Eigen::Index, Cone::groups> first;  // corner of a group
+  Eigen::Index of_contact = 0;
+  for (int g = 0; g < Cone::groups; ++g) {
+    corners[g] = Cone::size(g) == 1 ? 2 : edges;
+    first[g] = of_contact;
+    of_contact += corners[g];
+  }
   const Eigen::Index sliding = nc * Cone::groups;
-  const Eigen::Index reactions = nc + sliding * corners;
+  const Eigen::Index reactions = nc + nc * of_contact;
   const Eigen::Index all = reactions + sliding;
 
   // if each contact has a unit of its own, the cones do not change
@@ -42,11 +50,12 @@ Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(pr
     for (int g = 0; g < Cone::groups; ++g) {
       const Eigen::Index slip = reactions + a * Cone::groups + g;
       M_(slip, a) = cone.coefficient(g);
-      for (int k = 0; k < corners; ++k) {
-        const Eigen::Index at = nc + (a * Cone::groups + g) * corners + k;
-        const double angle = 2 * std::numbers::pi * k / corners;
-        B_(D * a + 1 + g * size, at) = unit[a] * std::cos(angle);
-        if (size > 1) B_(D * a + 1 + g * size + size - 1, at) = unit[a] * std::sin(angle);
+      for (int k = 0; k < corners[g]; ++k) {
+        const Eigen::Index at = nc + a * of_contact + first[g] + k;
+        const double angle = 2 * std::numbers::pi * k / corners[g];
+        const auto row = D * a + Cone::start(g);
+        B_(row, at) = unit[a] * std::cos(angle);
+        if (Cone::size(g) > 1) B_(row + Cone::size(g) - 1, at) = unit[a] * std::sin(angle);
         M_(at, slip) = 1;
         M_(slip, at) = -1;
       }

@@ -15,28 +15,28 @@ ProximalPoint<Cone>::ProximalPoint(const ReducedProblem& problem, CoupledSystem&
     : problem_(problem), system_(system) {}
 
 template <class Cone>
-void ProximalPoint<Cone>::weigh(bool own_rolling_rho) {
+void ProximalPoint<Cone>::weigh(bool own_angular_rho) {
   const Vector sizes = mean_diagonals(problem_);
   const double mean = mean_diagonal(problem_);
-  constexpr int moving = 1 + Cone::group_size;  // components that are not rolling
+  constexpr int moving = Cone::lengths;
   inverse_size_.resize(problem_.m());
   for (Index a = 0; a < problem_.nc(); ++a) {
     auto inverse = inverse_size_.template segment<D>(D * a);
     inverse.setConstant(1.0 / (sizes[a] > 0 ? sizes[a] : mean));
-    if (!own_rolling_rho || moving == D) continue;
+    if (!own_angular_rho || moving == D) continue;
     const auto diagonal = problem_.W.template diagonal_block<D>(a).diagonal().eval();
     const double of_moving = diagonal.template head<moving>().mean();
-    const double of_rolling = diagonal.template tail<D - moving>().mean();
-    if (!(of_moving > 0) || !(of_rolling > 0)) continue;
+    const double of_turning = diagonal.template tail<D - moving>().mean();
+    if (!(of_moving > 0) || !(of_turning > 0)) continue;
     inverse.template head<moving>().setConstant(1.0 / of_moving);
-    inverse.template tail<D - moving>().setConstant(1.0 / of_rolling);
+    inverse.template tail<D - moving>().setConstant(1.0 / of_turning);
   }
 }
 
 template <class Cone>
 double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, Vector& r,
                                   FunctionRef<bool(double)> report) {
-  weigh(rules.own_rolling_rho);
+  weigh(rules.own_angular_rho);
   const auto stop_at = system_.factorisations() + rules.max_factorisations;
   double kappa = rules.kappa;
   int cautious = 0;  // steps since a failure
@@ -104,15 +104,15 @@ void ProximalPoint<Cone>::put_into_cones(double kappa, const Vector& p, const Ve
     const Vec z = argument(kappa, u, a);
     Vec inside = p.template segment<D>(D * a);
     if (!(z[0] > 0) || !(inside[0] > 0)) inside.setZero();
-    for (int g = 0; g < Cone::groups; ++g) {
-      const int at = 1 + g * Cone::group_size;
-      auto part = inside.template segment<Cone::group_size>(at);
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int size = Cone::size(g);
+      auto part = inside.template segment<size>(at);
       const double norm = part.norm();
       const double radius = cone.coefficient(g) * inside[0];
-      const bool slides =
-          z.template segment<Cone::group_size>(at).norm() > cone.coefficient(g) * z[0];
+      const bool slides = z.template segment<size>(at).norm() > cone.coefficient(g) * z[0];
       if (norm > radius || (slides && norm > 0)) part *= radius / norm;
-    }
+    });
     result.template segment<D>(D * a) = inside;
   }
 }

@@ -3,7 +3,7 @@
 //
 //   p = alart_curnier_projection(r_k - rho (W p + q)),   rho_a = kappa d / tr(W_aa)
 //
-// The rolling components of a contact may have a rho of their own, from their part of W_aa: a small
+// The turning components of a contact may have a rho of their own, from their part of W_aa: a small
 // body turns far more easily than it moves, and how much more depends on the unit of length.
 //
 // Then project p on the cones: this is r_{k+1}. Each Newton step is one CoupledSystem with D = rho
@@ -40,7 +40,7 @@ struct ProximalRules {
   double hard = 0.5;      ///< factor after a failure
   double patience = 1e3;  ///< it is given up if the error rises above this times the best
   std::int64_t max_factorisations = 8;
-  bool own_rolling_rho = false;  ///< whether rolling components have their own rho
+  bool own_angular_rho = false;  ///< whether spin and rolling have their own rho
 };
 
 template <class Cone>
@@ -75,7 +75,7 @@ class ProximalPoint {
   void put_into_cones(double kappa, const Vector& p, const Vector& u, Vector& result) const;
 
   /// d / tr(W_aa) for the components of each contact, or the same for each of its parts.
-  void weigh(bool own_rolling_rho);
+  void weigh(bool own_angular_rho);
 
   /// Makes one proximal step and leaves it in next_, next_u_, next_error_. Returns the number of
   /// Newton steps; 0 if it failed.

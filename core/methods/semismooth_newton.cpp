@@ -95,13 +95,13 @@ void SemismoothNewton<Cone>::choose_rho(const NewtonRules& rules) {
     rho.setConstant(inverse(spectral_norm_[a]));
     if (rules.rho_rule == RhoRule::constant) rho.setOnes();
     if (function_.split && rules.rho_rule == RhoRule::split_spectral) {
-      constexpr int S = Cone::group_size;
       rho[0] = inverse(w(0, 0));
-      for (int g = 0; g < Cone::groups; ++g) {
-        const int at = 1 + g * S;
+      for_each_group<Cone>([&](auto g) {
+        constexpr int at = Cone::start(g);
+        constexpr int S = Cone::size(g);
         const double norm = spectral_norm(w.template block<S, S>(at, at));
         rho.template segment<S>(at).setConstant(inverse(norm));
-      }
+      });
     }
     rho *= rules.rho;
   }
@@ -254,8 +254,7 @@ double SemismoothNewton<Cone>::goldstein_price(const Function& f, double start, 
 template <class Cone>
 double SemismoothNewton<Cone>::search(LineSearch rule) {
   if (rule == LineSearch::none) return dr_.allFinite() ? 1.0 : 0.0;
-  constexpr bool rolling = Cone::groups > 1;
-  if constexpr (!rolling) {
+  if constexpr (Cone::groups == 1) {
     constexpr auto other = ContactFunctionKind::fischer_burmeister;
     if (rule == LineSearch::fischer_burmeister && kind_ != other)
       return search_by(contact_function<Cone>(other), rule);

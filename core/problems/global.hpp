@@ -30,6 +30,7 @@ struct GlobalProblem {
   static constexpr bool triplets_on_disk = true;   // the only storage that Siconos reads
 
   static constexpr bool rolling = false;
+  static constexpr bool spin = false;
   static constexpr std::array<Index, 2> dimensions{2, 3};  // the spacedims there are
 
   Index spacedim = 3;
@@ -50,7 +51,8 @@ struct GlobalProblem {
         Field<P, Index>{.name = "spacedim",
                         .member = &P::spacedim,
                         .unit = "1",
-                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling"},
+                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling, 4 "
+                               "or 6 with spin"},
         Field<P, Matrix>{.name = "M",
                          .member = &P::M,
                          .rows = Dim::n,
@@ -107,6 +109,8 @@ struct GlobalProblem {
         return G.cols;
       case Dim::nc:
         return static_cast<Index>(mu.size());
+      case Dim::nr:
+        return 0;
     }
     return 0;
   }

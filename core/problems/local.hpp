@@ -32,6 +32,7 @@ struct LocalProblem {
   static constexpr bool triplets_on_disk = false;  // W keeps its storage
 
   static constexpr bool rolling = false;
+  static constexpr bool spin = false;
   static constexpr std::array<Index, 2> dimensions{2, 3};  // the spacedims there are
 
   Index spacedim = 3;
@@ -51,7 +52,8 @@ struct LocalProblem {
         Field<P, Index>{.name = "spacedim",
                         .member = &P::spacedim,
                         .unit = "1",
-                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling"},
+                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling, 4 "
+                               "or 6 with spin"},
         Field<P, Matrix>{.name = "W",
                          .member = &P::W,
                          .rows = Dim::m,
@@ -104,6 +106,8 @@ struct LocalProblem {
         return R.rows;
       case Dim::nc:
         return static_cast<Index>(mu.size());
+      case Dim::nr:
+        return 0;
     }
     return 0;
   }

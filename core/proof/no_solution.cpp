@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
 
+#include "contact/laws.hpp"
 #include "linalg/dependent_columns.hpp"
 #include "linalg/exact_sum.hpp"
 
@@ -70,24 +72,22 @@ Index zero_rows(const LocalProblem& problem) { return problem.size(Dim::p); }
 Index zero_rows(const GlobalProblem& problem) { return problem.size(Dim::n); }
 
 /// An upper bound for the part of a contact: its distance from K*. It is 0 only inside K*.
-double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const Vector& image,
-                          Index a) {
+double distance_from_dual(Index d, const Friction& friction, const Vector& image, Index a) {
   // each part is off by at most two units, the norms and products by some more
   constexpr double more = 1 + 64 * unit;
-  const Index d = problem.spacedim;
   const double normal = image[d * a];
-  double tangential = 0;
-  if (mu_r == nullptr) {
-    tangential = problem.mu[a] * image.segment(d * a + 1, d - 1).norm();
-  } else {
-    const Index half = (d + 1) / 2;
-    tangential = problem.mu[a] * image.segment(d * a + 1, half - 1).norm() +
-                 (*mu_r)[a] * image.segment(d * a + half, d - half).norm();
-  }
+  double tangential = 0;  // the support function of the section of K
+  bool resists = false;
+  with_cone(static_cast<int>(d), friction, [&]<class Cone>() {
+    const Cone cone(friction, a);
+    typename Cone::Vec part = image.segment<Cone::dim>(d * a);
+    part[0] = 0;
+    tangential = cone.modified(part)[0];
+    for (int g = 0; g < Cone::groups; ++g) resists = resists || cone.coefficient(g) > 0;
+  });
   if (tangential == 0 && normal >= 0) {
     // a product that underflows is not zero
     const bool moves = (image.segment(d * a + 1, d - 1).array() != 0).any();
-    const bool resists = problem.mu[a] > 0 || (mu_r != nullptr && (*mu_r)[a] > 0);
     if (!(moves && resists)) return 0;
   }
   if (normal > 0 && tangential > 1e-250 && normal >= more * tangential) return 0;
@@ -464,7 +464,7 @@ bool has_exact_neighbour(const GlobalProblem& problem, const Vector& y, const Ve
   return distance < nearest * least && gain - 2 * distance * constants > least_gain * terms;
 }
 
-NoSolution check_local(const LocalProblem& problem, const Vector* mu_r, const Vector& y,
+NoSolution check_local(const LocalProblem& problem, const Friction& friction, const Vector& y,
                        const Vector& given) {
   const Vector z = given.size() > 0 ? given : Vector(Vector::Zero(problem.size(Dim::p)));
   std::vector<ExactSum> cone;
@@ -478,7 +478,7 @@ NoSolution check_local(const LocalProblem& problem, const Vector* mu_r, const Ve
   for (Eigen::Index k = 0; k < image.size(); ++k)
     image[k] = cone[static_cast<std::size_t>(k)].value();
   Vector distance(nc);
-  for (Index a = 0; a < nc; ++a) distance[a] = distance_from_dual(problem, mu_r, image, a);
+  for (Index a = 0; a < nc; ++a) distance[a] = distance_from_dual(d, friction, image, a);
   const double infinity = std::numeric_limits<double>::infinity();
   if ((distance.array() == 0).all()) return {y, z, gain, 0, infinity};
   if (z.size() > 0) return {};
@@ -513,27 +513,31 @@ NoSolution judge(const GlobalProblem& problem, const Vector& y, const Vector& gi
 
 }  // namespace
 
-NoSolution check_no_solution(const LocalProblem& problem, const Vector& y, const Vector& z) {
-  return check_local(problem, nullptr, y, z);
+template <class P>
+NoSolution check_no_solution(const P& problem, const Vector& y, const Vector& z) {
+  if constexpr (std::derived_from<P, GlobalProblem>) {
+    // the law has no part in it
+    return judge(static_cast<const GlobalProblem&>(problem), y, z, Exactness::neighbour);
+  } else {
+    return check_local(problem, friction_of(problem), y, z);
+  }
 }
 
-NoSolution check_no_solution(const LocalRollingProblem& problem, const Vector& y, const Vector& z) {
-  return check_local(problem, &problem.mu_r, y, z);
+template <class P>
+NoSolution prove_no_solution(const P& problem, const Vector& y) {
+  if constexpr (std::derived_from<P, GlobalProblem>) {
+    const GlobalProblem& global = problem;
+    NoSolution found = search(global, y);
+    return found.proven() ? found : search(global, y, Exactness::neighbour);
+  } else {
+    return search(problem, y);
+  }
 }
 
-NoSolution check_no_solution(const GlobalProblem& problem, const Vector& y, const Vector& z) {
-  return judge(problem, y, z, Exactness::neighbour);
-}
-
-NoSolution prove_no_solution(const LocalProblem& problem, const Vector& y) {
-  return search(problem, y);
-}
-NoSolution prove_no_solution(const LocalRollingProblem& problem, const Vector& y) {
-  return search(problem, y);
-}
-NoSolution prove_no_solution(const GlobalProblem& problem, const Vector& y) {
-  NoSolution found = search(problem, y);
-  return found.proven() ? found : search(problem, y, Exactness::neighbour);
-}
+#define FCLIB_INSTANTIATE(P)                                                        \
+  template NoSolution check_no_solution<P>(const P&, const Vector&, const Vector&); \
+  template NoSolution prove_no_solution<P>(const P&, const Vector&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
 
 }  // namespace fclib

@@ -51,15 +51,18 @@ struct NoSolution {
 };
 
 /// What y and z, or real numbers next to them, prove. Nothing if they have the wrong sizes.
-NoSolution check_no_solution(const LocalProblem& problem, const Vector& y, const Vector& z = {});
-NoSolution check_no_solution(const LocalRollingProblem& problem, const Vector& y,
-                             const Vector& z = {});
-NoSolution check_no_solution(const GlobalProblem& problem, const Vector& y, const Vector& z = {});
+template <class P>
+NoSolution check_no_solution(const P& problem, const Vector& y, const Vector& z = {});
 
 /// A proof near y, which an iteration found. z is computed, and both are changed until the sums
 /// vanish exactly, on as few contacts as possible.
-NoSolution prove_no_solution(const LocalProblem& problem, const Vector& y);
-NoSolution prove_no_solution(const LocalRollingProblem& problem, const Vector& y);
-NoSolution prove_no_solution(const GlobalProblem& problem, const Vector& y);
+template <class P>
+NoSolution prove_no_solution(const P& problem, const Vector& y);
+
+#define FCLIB_DECLARE(P)                                                                   \
+  extern template NoSolution check_no_solution<P>(const P&, const Vector&, const Vector&); \
+  extern template NoSolution prove_no_solution<P>(const P&, const Vector&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
 
 }  // namespace fclib

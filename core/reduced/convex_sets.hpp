@@ -1,7 +1,8 @@
 // The convex sets of the subproblems with a fixed shift, or with a fixed threshold:
 //
 //   Cones       r in K
-//   Cylinders   r_N >= 0, ||r_T|| <= g (and ||r_R|| <= g_R); the normal or the tangential part may
+//   Cylinders   r_N >= 0, ||r_T|| <= g (and so for each other group); the normal or the tangential
+//   part may
 //               be held fixed
 //
 // A set offers the Euclidean projection for contact a, `project(a, x, now)`: `now` has the parts
@@ -19,8 +20,7 @@
 
 namespace fclib {
 
-/// The largest row sum of the symmetric part. It is at least the largest eigenvalue. N = 1, 2, 3,
-/// 5.
+/// The largest row sum of the symmetric part. It is at least the largest eigenvalue. N = 1 to 6.
 template <int N>
 double curvature_bound(const ContactMatrix<N>& a);
 
@@ -33,11 +33,11 @@ struct ContactCurvature {
 
   explicit ContactCurvature(const ContactMatrix<Cone::dim>& a)
       : block(a), whole(curvature_bound<Cone::dim>(a)) {
-    for (int g = 0; g < Cone::groups; ++g) {
-      const int at = 1 + g * Cone::group_size;
-      groups[static_cast<std::size_t>(g)] = curvature_bound<Cone::group_size>(
-          a.template block<Cone::group_size, Cone::group_size>(at, at));
-    }
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int size = Cone::size(g);
+      groups[g] = curvature_bound<size>(a.template block<size, size>(at, at));
+    });
   }
 };
 
@@ -81,7 +81,6 @@ class Cylinders {
  public:
   using Cone = ConeType;
   using Vec = typename Cone::Vec;
-  static constexpr int size = Cone::group_size;
 
   bool normal = true;      ///< r_N may change
   bool tangential = true;  ///< r_T may change
@@ -104,11 +103,13 @@ class Cylinders {
     Vec result = now;
     if (normal) result[0] = std::max(0.0, x[0]);
     if (!tangential) return result;
-    for (int g = 0; g < Cone::groups; ++g) {
-      auto part = result.template segment<size>(1 + g * size);
-      part = x.template segment<size>(1 + g * size);
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int size = Cone::size(g);
+      auto part = result.template segment<size>(at);
+      part = x.template segment<size>(at);
       limit(radius_[Cone::groups * a + g], part);
-    }
+    });
     return result;
   }
 
@@ -118,15 +119,16 @@ class Cylinders {
       if (normal && c.block(0, 0) > 0) {
         r[0] = std::max(0.0, r[0] - (b[0] + c.block.row(0).dot(r)) / c.block(0, 0));
       }
-      for (int g = 0; tangential && g < Cone::groups; ++g) {
-        const double curvature = c.groups[static_cast<std::size_t>(g)];
-        if (!(curvature > 0)) continue;
-        const int at = 1 + g * size;
+      for_each_group<Cone>([&](auto g) {
+        const double curvature = c.groups[g];
+        if (!tangential || !(curvature > 0)) return;
+        constexpr int at = Cone::start(g);
+        constexpr int size = Cone::size(g);
         auto part = r.template segment<size>(at);
         part -= (b.template segment<size>(at) + c.block.template middleRows<size>(at) * r).eval() /
                 curvature;
         limit(radius_[Cone::groups * a + g], part);
-      }
+      });
       if ((r - old).squaredNorm() <= 1e-12 * r.squaredNorm()) return;
     }
   }

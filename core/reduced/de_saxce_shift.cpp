@@ -8,10 +8,9 @@ void de_saxce_shift(const Vector& u, const Friction& friction, Vector& shift) {
   for (Eigen::Index a = 0; a < shift.size(); ++a) {
     double sum = 0;
     const Cone cone(friction, a);
-    for (int g = 0; g < Cone::groups; ++g) {
-      sum += cone.coefficient(g) *
-             u.template segment<Cone::group_size>(D * a + 1 + g * Cone::group_size).norm();
-    }
+    for_each_group<Cone>([&](auto g) {
+      sum += cone.coefficient(g) * u.template segment<Cone::size(g)>(D * a + Cone::start(g)).norm();
+    });
     shift[a] = sum;
   }
 }

@@ -18,7 +18,7 @@ constexpr double nothing = 1e-14;
 OwnUnits::OwnUnits(const ReducedProblem& problem)
     : problem_(problem), unit_(problem.m()), friction_(problem.friction) {
   const int d = problem.d();
-  const int moved = problem.rolling() ? (d + 1) / 2 : d;  // components before the rolling ones
+  const int moved = problem.friction.lengths(d);
   with_dimension(d, [&](auto dim) {
     for (Index a = 0; a < problem.nc(); ++a) {
       unit_.segment<dim>(Eigen::Index{dim} * a) = problem.W.diagonal_block<dim>(a).diagonal();
@@ -51,10 +51,9 @@ OwnUnits::OwnUnits(const ReducedProblem& problem)
   q_ = problem.q.cwiseProduct(inverse_);
   if (const double size = q_.lpNorm<Eigen::Infinity>(); size > 0) size_ = size;
   q_ /= size_;
-  if (problem.rolling()) {
-    for (Index a = 0; a < problem.nc(); ++a) {
-      const auto first = Eigen::Index{d} * a;
-      friction_.mu_r[a] *= unit_[first + moved] * inverse_[first];
+  for (Vector* const coefficients : {&friction_.mu_r, &friction_.mu_s}) {  // they are lengths
+    for (Eigen::Index a = 0; a < coefficients->size(); ++a) {
+      (*coefficients)[a] *= unit_[d * a + moved] * inverse_[d * a];
     }
   }
 }

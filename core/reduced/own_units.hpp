@@ -4,9 +4,9 @@
 //   r~ = S r / size,  u~ = S^-1 u / size,  W~ = S^-1 W S^-1,  q~ = S^-1 q / size
 //
 // S is diagonal. Its entries are the root of the mean diagonal of W_aa over the normal and the
-// tangential part, and of that over the rolling part. So masses may differ from contact to contact,
-// and lengths may stand beside angles. A cone stays one of its kind, with mu_r~ = mu_r s_R / s_N,
-// and r~ . u~ is r . u / size^2. ||q~||_inf is 1.
+// tangential part, and of that over the parts of spin and rolling. So masses may differ from
+// contact to contact, and lengths may stand beside angles. A cone stays one of its kind, with mu_r~
+// = mu_r s_R / s_N and mu_s~ alike, and r~ . u~ is r . u / size^2. ||q~||_inf is 1.
 #pragma once
 
 #include "reduced/reduced_problem.hpp"
@@ -17,7 +17,7 @@ class OwnUnits {
  public:
   explicit OwnUnits(const ReducedProblem& problem);
 
-  /// The friction, with mu_r~ in place of mu_r.
+  /// The friction, with mu_r~ and mu_s~ in the places of mu_r and mu_s.
   [[nodiscard]] const Friction& friction() const { return friction_; }
   /// q~ (m).
   [[nodiscard]] const Vector& q() const { return q_; }

@@ -36,7 +36,6 @@ struct ReducedProblem {
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }
   [[nodiscard]] Eigen::Index m() const { return q.size(); }
-  [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
 
   /// If this is true, factorisations fail: there is no time for them.
   [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }

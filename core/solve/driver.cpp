@@ -1,6 +1,7 @@
 #include "solve/driver.hpp"
 
 #include <algorithm>
+#include <concepts>
 #include <cstdio>
 #include <functional>
 #include <limits>
@@ -11,6 +12,8 @@
 #include "joints/consistent.hpp"
 #include "linalg/stopwatch.hpp"
 #include "number_text.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/round.hpp"
 #include "solve/plugin.hpp"
 
 namespace fclib {
@@ -132,6 +135,23 @@ std::vector<Index> held_contacts(const LocalProblem& plain, const std::vector<bo
   return result;
 }
 
+/// Runs the solver, on a round cone if the one of the problem is an ellipsoid. `tolerance` becomes
+/// the error that the solver reached there if it is less: the two cones measure differently.
+Outcome solve_round(const Matrix& W, const ReducedProblem& problem, const Solver& solver,
+                    const OptionValues& options, const Settings& settings, double& tolerance,
+                    Vector& r) {
+  if (!problem.friction.coupled) return solver.solve(problem, options, settings, r);
+  const Round round(W, problem);
+  Vector own = round.to_own(r);
+  Outcome outcome = solver.solve(round.problem(), options, settings, own);
+  Vector u;
+  round.problem().velocity(own, u);
+  const double error = relative_error<Coulomb<4>>(round.problem(), u, own);
+  if (error > 0 && error < tolerance) tolerance = error;
+  r = round.reactions(own);
+  return outcome;
+}
+
 /// Runs the solver on the reduced form and judges it by `judge(r)`, which completes the solution.
 /// `prove` looks for a proof near y that the problem as given has no solution.
 template <class Judge>
@@ -197,7 +217,9 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   Solution best;
   for (int correction = 0;; ++correction) {
     const Times start = request.watch.read();
-    Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
+    double reached = settings.tolerance;
+    Outcome outcome =
+        solve_round(plain.W, reduced, request.solver, request.options, settings, reached, r);
     const Times own = request.watch.read() - start - outcome.setup;
     result.cpu_s += outcome.cpu_s.value_or(own.cpu);
     result.time += own.wall;
@@ -246,8 +268,8 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
         return result;
       }
       const double digit = last_digit(r, product, reduced.scale);
-      const bool reached = digit > request.settings.tolerance && result.error <= digit;
-      if (reached && result.status != Status::infeasible && result.message.empty()) {
+      const bool all_digits = digit > request.settings.tolerance && result.error <= digit;
+      if (all_digits && result.status != Status::infeasible && result.message.empty()) {
         result.message = too_coarse(digit);
       }
       return result;
@@ -267,7 +289,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     if (correction == max_corrections || (result.status != Status::inaccurate && !hidden)) {
       return end();
     }
-    if (!hidden) settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
+    if (!hidden) settings.tolerance = reached * (0.5 * request.settings.tolerance / result.error);
     // what conversions lost of the velocity of the problem as given is added to q
     Vector u;
     reduced.velocity(r, u);
@@ -320,7 +342,9 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
                     std::to_string(problem.size(Dim::m)) + " finite ones",
                 "guess r");
   }
-  const auto& taken = P::rolling ? solver.rolling_dimensions : solver.dimensions;
+  const auto& taken = P::rolling ? solver.rolling_dimensions
+                      : P::spin  ? solver.spin_dimensions
+                                 : solver.dimensions;
   if (std::find(taken.begin(), taken.end(), problem.spacedim) == taken.end()) {
     throw Error(ErrorKind::unsuitable,
                 "solver " + solver.name + " does not take " + formulation(problem) + " problems");
@@ -475,25 +499,20 @@ const Solver& find_solver(std::string_view name) {
               "solver '" + std::string(name) + "'");
 }
 
-Result solve(const LocalProblem& problem, const Solver& solver, const Settings& settings,
+template <class P>
+Result solve(const P& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_local<LocalProblem>);
+  if constexpr (std::derived_from<P, GlobalProblem>) {
+    return solve_any(problem, solver, settings, options, guess, solve_consistent<P>);
+  } else {
+    return solve_any(problem, solver, settings, options, guess, solve_local<P>);
+  }
 }
 
-Result solve(const LocalRollingProblem& problem, const Solver& solver, const Settings& settings,
-             const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_local<LocalRollingProblem>);
-}
-
-Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings,
-             const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_consistent<GlobalProblem>);
-}
-
-Result solve(const GlobalRollingProblem& problem, const Solver& solver, const Settings& settings,
-             const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess,
-                   solve_consistent<GlobalRollingProblem>);
-}
+#define FCLIB_INSTANTIATE(P)                                                              \
+  template Result solve<P>(const P&, const Solver&, const Settings&, const OptionValues&, \
+                           const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
 
 }  // namespace fclib

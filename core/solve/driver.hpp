@@ -42,16 +42,14 @@ struct Result {
 ///
 /// Throws Error: (problem) for invalid data, (option) for an unknown solver or option, (unsuitable)
 /// if the problem cannot be brought to the form that the solver takes.
-Result solve(const LocalProblem& problem, const Solver& solver, const Settings& settings = {},
+template <class P>
+Result solve(const P& problem, const Solver& solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
-Result solve(const LocalRollingProblem& problem, const Solver& solver,
-             const Settings& settings = {}, const OptionValues& options = {},
-             const Solution& guess = {});
-Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings = {},
-             const OptionValues& options = {}, const Solution& guess = {});
-Result solve(const GlobalRollingProblem& problem, const Solver& solver,
-             const Settings& settings = {}, const OptionValues& options = {},
-             const Solution& guess = {});
+#define FCLIB_DECLARE(P)                                                                         \
+  extern template Result solve<P>(const P&, const Solver&, const Settings&, const OptionValues&, \
+                                  const Solution&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
 
 /// The same with the name of a solver in the registry.
 template <class P>

@@ -128,7 +128,7 @@ Outcome run(Function function, const std::string& name, const std::vector<Option
     return static_cast<Call*>(context)->stop(iterate) ? 1 : 0;
   };
   given.context = &call;
-  given.mu_r = problem.rolling() ? problem.friction.mu_r.data() : nullptr;
+  given.mu_r = problem.friction.mu_r.size() > 0 ? problem.friction.mu_r.data() : nullptr;
   given.number = [](void* context, const char* option) {
     return static_cast<Call*>(context)->number(text_of(option));
   };

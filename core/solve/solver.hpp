@@ -165,8 +165,9 @@ struct Solver {
   std::string family;
   std::string title;
   std::string citation;
-  std::vector<int> dimensions;          ///< the spacedims that it takes
-  std::vector<int> rolling_dimensions;  ///< ... of rolling problems
+  std::vector<int> dimensions;            ///< the spacedims that it takes
+  std::vector<int> rolling_dimensions;    ///< ... of rolling problems
+  std::vector<int> spin_dimensions = {};  ///< ... of problems with spin
   std::vector<OptionInfo> options;
   std::int64_t max_iterations = 0;  ///< if the caller sets none
   /// Solves from the guess in r (length m), and leaves its best iterate there.

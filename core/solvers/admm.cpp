@@ -134,6 +134,7 @@ const Solver& solver() {
           "2017",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .solve = solve,

@@ -95,6 +95,7 @@ const Solver& solver() {
       .citation = "Mazhar, Heyn, Negrut & Tasora 2015; Nesterov 1983; O'Donoghue & Candes 2015",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .solve = solve,

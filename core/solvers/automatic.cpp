@@ -15,60 +15,52 @@ namespace {
 
 constexpr const char* table = R"(
 # name                          : method              where and from what              rules
-gauss-seidel                    : gauss_seidel        on=whole at_most=2               limit=5 worth=0
-gauss-seidel                    : gauss_seidel        on=whole at_least=3              limit=20 worth=0
-# between walls that joints hold, sweeps let reactions grow without bound
-proximal newton                 : polish              jointed=0.1 from=nothing         limit=12
-# bodies at rest that stick everywhere, from the guess where there is one
+# The comment of a row names problems that are not solved without it, or take several times as long.
+# Numbers are those of tests/planted_judge.py; workshop/tuning/notes.md has the rest.
+gauss-seidel                    : gauss_seidel        on=whole                         limit=20 worth=0
+# bodies at rest that stick everywhere, from the guess if there is one
 conjugate gradients             : conjugate_gradients at_least=20                      limit=400
-# a good guess: the statuses are nearly known; on few bodies the proximal point is cheaper
-proximal newton                 : polish              at_least=5 below=0.03 guessed=true bodies=fewer limit=12
+# a good guess on many bodies: the statuses are nearly known (a rover at rest, step by step)
 newton from the guess           : semismooth_newton   at_least=5 below=0.03 guessed=true bodies=more from=best function=alart_curnier sweeps=0 patience=3 limit=12
 gauss-seidel                    : gauss_seidel                                         limit=100
 # large and dense, to a loose tolerance: a factorisation costs as much as hundreds of products with W
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
-# from near what the sweeps have; then, where its path folds, from far away
-interior point                  : interior_point      law=coulomb from=swept           far=4 tau=0.03 limit=60
-# rolling contacts have errors in two units: where it slows down, the proximal point is near enough
-interior point                  : interior_point      law=rolling from=swept           far=4 tau=0.03 limit=60 polish=1e-4
-# dense heaps on which its path ends: gradients, for what the interior point has cost
+# from near what the sweeps have; where it slows down, the proximal point is near enough
+interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60 polish=1e-4
+# dense heaps on which its path ends, or no memory for factors (ChainMail/0599 to 1e-4)
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
-# near a solution, once gradients or sweeps have smoothed what the interior point has left
+# near a solution, once gradients or sweeps have smoothed what the interior point has left (large heaps:
+# docs/results/auto-near-heaps.csv)
 proximal point, near            : proximal_point      from=best below=1e-4             limit=200
-# errors in two units, of which one is met: another function has other steps (a rover on stones)
-newton, near                    : semismooth_newton   from=best below=1e-6 law=coulomb function=fischer_burmeister limit=30
+# where the path of the first one folds: from far away
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
-# a tight tolerance, where interior points end at rounding
+# a tight tolerance, where interior points end at rounding (PeriodicBox/0995 to 1e-12)
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
+# 103494
 gauss-seidel                    : sweep_on            law=coulomb
-# a proof is found at once or not at all, and spares what follows
+# a proof is found at once or not at all, and spares what follows (Squeezed/0000)
 no solution?                    : no_solution                                          limit=60
-# cheap beside what follows
+# cheap beside what follows (a pile of boxes that overlap: drakehard-sap-0140)
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
+# (Chute4000/0074; Chute1000/0116 to 1e-4)
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
-# where most bodies rest: reactions that hold them are found by convex problems. With all that creep,
-# then without most of them
+# where most bodies rest: reactions that hold them are found by convex problems, with all that creep
 held bodies                     : held_bodies         at_least=100                     creep=0
-held bodies                     : held_bodies         at_least=100
-associated                      : associated
+# 100786, 101711
 proximal point                  : proximal_point      from=best                        limit=200
-# slow, but cheaper than the paths that follow
+# slow, but cheaper than the path that follows (101015)
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
-# another width of smoothing is another path
 homotopy                        : homotopy                                             smoothing=0.3 limit=1500
-homotopy                        : homotopy                                             smoothing=1 limit=1500
-# contacts that wedge each other: few enough for dense tableaux
+# contacts that wedge each other: few enough for dense tableaux (101098; then 100791, 101340)
 pivoting                        : pivoting            at_most=20                       edges=4 tries=60
 pivoting                        : pivoting            at_most=8                        edges=16 tries=40
+# 102888
 random starts                   : random_starts       at_most=12                       tries=200
-# the last resort
-proximal point                  : proximal_point      from=associated                  wander=true limit=400
-proximal point                  : proximal_point      from=best                        wander=true limit=800
+# the last resort (103503)
 proximal point                  : proximal_point      from=best                        wander=true limit=1600
-proximal point                  : proximal_point      from=best                        wander=true limit=1200
 )";
 
 /// Parsed as the library is loaded, so that no solve pays for it.
@@ -120,6 +112,7 @@ const Solver& solver() {
       .citation = "this project",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .solve = solve,

@@ -92,6 +92,7 @@ const Solver& solver() {
       .citation = "Chow, Mallet-Paret & Yorke 1978; Keller 1977; the path is this project's",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 100000,
       .solve = solve,

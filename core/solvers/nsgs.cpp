@@ -120,6 +120,7 @@ const Solver& solver() {
       .citation = "Jean & Moreau 1992; Jourdan, Alart & Jean 1998; Acary, Bremond & Huber 2018",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .solve = solve,

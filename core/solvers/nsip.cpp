@@ -10,17 +10,20 @@
 // mechanics using interior point algorithm" (2023).
 //
 // Differs from the paper in: the paper's problem is the convex one; here the shift is linearised
-// with the rest. The system is regularised, and condensed to the contacts or the bodies. It starts
-// near the guess, well inside the cones. When its steps end, sweeps of Gauss-Seidel follow
+// with the rest. Rolling and spin have cones of their own (methods/product_interior_point.hpp), of
+// which only the sum of the normal parts is known. Their path has no smoothing. The system is
+// regularised, and condensed to the contacts or the bodies. It starts near the guess, well inside
+// the cones. When its steps end, sweeps of Gauss-Seidel follow
 // (`sweeps`). The reason: the scaling contains the gap mu r_N - ||r_T|| of sliding contacts, which
 // falls below the rounding of r. If a direction of sliding is wrong by e, the gap changes only by
 // e^2 / 2. So the direction is known to 1e-6 or 1e-7, and the interior point cannot improve it.
 //
 // The problem is not convex: the path may fold, and the method then ends `stalled`.
 
-#include "methods/interior_point.hpp"
+#include "methods/product_interior_point.hpp"
 #include "methods/shared_options.hpp"
 #include "reduced/gauss_seidel.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 #include "solve/solver.hpp"
 
@@ -43,16 +46,16 @@ struct Options : InteriorPointRules {
   }
 };
 
-template <int D>
+template <class Cone>
 Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
-  BestIterate<Coulomb<D>> best(problem, settings, r);
+  BestIterate<Cone> best(problem, settings, r);
   Vector u(problem.m());
   problem.velocity(r, u);
   if (best.report(0, r, u)) return best.outcome(r);
 
   CoupledSystem system(problem);
-  InteriorPoint<D> method(problem, system);
+  typename InteriorPointFor<Cone>::type method(problem, system);
   InteriorPointRules rules = options;
   rules.max_iterations = std::numeric_limits<int>::max();
   method.solve(rules, Vector(r), [&](double error, const Vector& at) {
@@ -62,7 +65,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
 
   best.outcome(r);
   problem.velocity(r, u);
-  GaussSeidel<Coulomb<D>> contacts(problem);
+  GaussSeidel<Cone> contacts(problem);
   for (std::int64_t sweep = 0; sweep < options.sweeps && !best.stopped(); ++sweep) {
     contacts.sweep(r, u);
     best.report(1, r, u);
@@ -73,8 +76,8 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
 Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  return problem.d() == 2 ? iterate<2>(problem, options, settings, r)
-                          : iterate<3>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace
@@ -87,7 +90,8 @@ const Solver& solver() {
       .citation =
           "Acary, Armand, Nguyen & Shpakovych 2023, with de Saxce's term in Newton's system",
       .dimensions = {2, 3},
-      .rolling_dimensions = {},
+      .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1000,
       .solve = solve,

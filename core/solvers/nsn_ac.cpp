@@ -25,9 +25,13 @@
 namespace fclib::nsn_ac {
 
 const Solver& solver() {
-  static const Solver entry =
-      newton_entry("nsn-ac", "Nonsmooth Newton, Alart and Curnier", "Alart & Curnier 1991", {3, 5},
-                   ContactFunctionKind::alart_curnier);
+  static const Solver entry = [] {
+    Solver result =
+        newton_entry("nsn-ac", "Nonsmooth Newton, Alart and Curnier", "Alart & Curnier 1991",
+                     {3, 5}, ContactFunctionKind::alart_curnier);
+    result.spin_dimensions = {4, 6};
+    return result;
+  }();
   return entry;
 }
 

@@ -93,6 +93,7 @@ const Solver& solver() {
       .citation = "Rockafellar 1976; Acary, Bremond & Huber 2018",
       .dimensions = {2, 3},
       .rolling_dimensions = {3, 5},
+      .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 10'000,
       .solve = solve,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
@@ -101,10 +100,10 @@ def solve_batch(
         unsolved: for arrays on a GPU: whether what it does not solve goes to the solver ``auto`` on
             the CPU ("cpu"), or stays as it is ("leave"); then nothing waits for the GPU.
 
-    If an array is on a GPU (of CuPy, PyTorch, JAX, Warp), all is solved there, without a copy and in
-    the order of the caller's stream, and a ``DeviceBatchResult`` is returned. This needs
-    ``fclib[gpu]``. A problem with an entry that is not finite, or a negative mu, then has the status
-    "invalid", and r = 0.
+    If an array is on a GPU (of CuPy, PyTorch, JAX, Warp), all is solved there, without a copy and
+    in the order of the caller's stream, and a ``DeviceBatchResult`` is returned. This needs
+    ``fclib[gpu]``. A problem with an entry that is not finite, or a negative mu, then has the
+    status "invalid", and r = 0.
 
     Returns:
         Arrays over the problems. A problem is ``converged`` only if the merit, recomputed in
@@ -238,10 +237,11 @@ def _of_bodies(
     rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])
     if sizes is not None and len(matrix) != sizes.sum():
         raise _core.ProblemError(f"jacobian: has {len(matrix)} rows, expected {sizes.sum()}")
-    if q is not None and sizes is None:
-        q = _shaped("q", q, matrix.shape[:2])
-    elif q is not None:
-        q = np.split(_shaped("q", _flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
+    if q is not None:
+        if sizes is None:
+            q = _shaped("q", q, matrix.shape[:2])
+        else:
+            q = np.split(_shaped("q", _flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
     found = [
         _device.local(
             one,

@@ -6,7 +6,10 @@ With the equations of the problem, Coulomb's law at each contact is, near a solu
     stick   du = 0
     slide   du_N = 0,   dr_T = -mu t dr_N - r_N t dmu - mu r_N (I - t t^T) / ||u_T|| du_T
 
-with t = u_T / ||u_T||. The status follows from z = r - rho u, which Alart & Curnier's map projects.
+with t = u_T / ||u_T||. Spin and rolling are the same with their coefficients, and each group sticks
+or moves for itself. If sliding and spin share an ellipsoid with half-axes E, the contact moves with
+r_t = -r_N E^2 u_t / ||E u_t||. The status follows from z = r - rho u, which Alart & Curnier's map
+projects.
 If z lies on a border between two statuses (grazing, at the limit of friction), the solution has no
 derivative. One of the two is taken, an element of the generalised Jacobian of the map, and the
 contact is flagged. If redundant contacts leave r undetermined, the least change of r is given.
@@ -20,11 +23,11 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
+from fclib import _core, _laws
 from fclib._equality import EqualByEntries
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Smooth: TypeAlias = _core.LocalProblem | _core.GlobalProblem
+Smooth: TypeAlias = _laws.Problem
 
 # relative to the largest z: a z nearer to a border than this counts as on it
 BORDER = 1e-6
@@ -66,6 +69,7 @@ class Gradient(EqualByEntries):
         mu: (nc,)
         q, W, s: of a local problem.
         f, w, M, H, b: of a global one.
+        mu_s, mu_r: (nc,) of a problem with spin or rolling friction.
         degenerate: (nc,) contacts on a border between two statuses.
         unique: whether the derivative is unique; if not, it belongs to the least change of r and l.
         error: ``Merit.error`` of the solution; if it is large, the numbers here mean nothing.
@@ -83,6 +87,8 @@ class Gradient(EqualByEntries):
     degenerate: npt.NDArray[np.bool_]
     unique: bool
     error: float
+    mu_s: Array | None = None
+    mu_r: Array | None = None
 
 
 def jvp(
@@ -98,11 +104,13 @@ def jvp(
     M: Any = None,
     H: Any = None,
     b: npt.ArrayLike | None = None,
+    mu_s: npt.ArrayLike | None = None,
+    mu_r: npt.ArrayLike | None = None,
 ) -> Tangent:
     """The change of a solution if the data change: forward mode.
 
     Args:
-        problem: a problem without rolling.
+        problem: any formulation.
         solution: its solution: a Solution, a Result, or only the reactions if there are no
             bilateral constraints.
         mu: change of mu.
@@ -114,14 +122,17 @@ def jvp(
         M: change of M.
         H: change of H.
         b: change of b.
+        mu_s: change of mu_s, with spin friction.
+        mu_r: change of mu_r, with rolling friction.
 
     Raises:
         ProblemError: a datum that the problem does not have, a wrong shape, or values that are not
             numbers.
-        UnsuitableError: the problem has rolling friction, or its M is not positive definite.
+        UnsuitableError: M is not positive definite.
     """
     point = _Point(problem, solution)
     given = {"mu": mu, "q": q, "W": W, "s": s, "f": f, "w": w, "M": M, "H": H, "b": b}
+    given |= {"mu_s": mu_s, "mu_r": mu_r}
     change = {
         name: _of_shape(name, value, getattr(problem, name, None))
         for name, value in given.items()
@@ -144,7 +155,7 @@ def vjp(
     r*, u*, v* and l* are the solution, r, u, v and l weights.
 
     Args:
-        problem: a problem without rolling.
+        problem: any formulation.
         solution: as for ``jvp``.
         r: weights, for example the derivatives of a loss by r; zero if left out.
         u: the same for u.
@@ -153,7 +164,7 @@ def vjp(
 
     Raises:
         ProblemError: weights of a wrong shape, for unknowns that the problem lacks, or not numbers.
-        UnsuitableError: the problem has rolling friction, or its M is not positive definite.
+        UnsuitableError: M is not positive definite.
     """
     return _Point(problem, solution).gradient({"r": r, "u": u, "v": v, "l": l})
 
@@ -197,6 +208,23 @@ def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
     return sp.csr_array((values, (at.row, at.col)), shape=matrix.shape)
 
 
+def _beyond(group: _laws.Group, z: Array) -> Array:
+    """How far z_g is outside its limit at z_N (nc): negative inside."""
+    part = z[:, group.part]
+    if group.uniform:
+        return np.asarray(np.linalg.norm(part, axis=1) - group.coefficient * z[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(part == 0, 0.0, part / group.axes)
+    far = group.axes.max(axis=1) * (np.linalg.norm(shares, axis=1) - z[:, 0])
+    return np.asarray(far)
+
+
+def _across(z: Array, axes: Array) -> Array:
+    """The direction in which a contact would slide, from a z_g at its limit."""
+    squares = axes * axes
+    return np.divide(z, squares, out=np.zeros_like(z), where=squares > 0)
+
+
 class _Point:
     """A solution of a problem, and the linear system that its derivatives solve.
 
@@ -204,10 +232,6 @@ class _Point:
     """
 
     def __init__(self, problem: Smooth, solution: Any) -> None:
-        if not isinstance(problem, (_core.LocalProblem, _core.GlobalProblem)):
-            raise _core.UnsuitableError(
-                f"{type(problem).__name__}: derivatives are there for problems without rolling"
-            )
         solution = _core.solution_from(solution)
         self.problem = problem
         self.d, self.nc, self.m, self.p = problem.spacedim, problem.nc, problem.m, problem.p
@@ -220,7 +244,7 @@ class _Point:
         self.v: Array | None = None
         self.moving = np.zeros(0)
         m, p = self.m, self.p
-        if isinstance(problem, _core.LocalProblem):
+        if isinstance(problem, _laws.Local):
             W = _dense(problem.W)
             V = _dense(problem.V) if p else np.zeros((m, 0))
             R = _dense(problem.R) if p else np.zeros((0, 0))
@@ -259,43 +283,62 @@ class _Point:
             }
 
     def _law(self, diagonal: Array) -> None:
-        """by_u du + by_r dr = by_mu dmu, contact by contact."""
+        """by_u du + by_r dr = sum of by_friction[c] dc over the coefficients c, by contacts."""
         d, nc = self.d, self.nc
         size = diagonal.reshape(nc, d).mean(axis=1)
         # a contact that moves nothing has no own scale
         size[size <= 0] = size.max(initial=0.0) or 1.0
         rho = 1 / size
-        mu = self.problem.mu
         u, r = self.u.reshape(nc, d), self.r.reshape(nc, d)
         z = r - rho[:, None] * u
-        sliding = np.linalg.norm(z[:, 1:], axis=1)
         border = BORDER * np.linalg.norm(z, axis=1).max(initial=0.0)
         opened = z[:, 0] <= 0
-        slides = ~opened & ((sliding > mu * z[:, 0]) | (mu == 0))
         self.degenerate = np.abs(z[:, 0]) <= border
-        self.degenerate |= ~opened & (np.abs(sliding - mu * z[:, 0]) <= border)
         self.by_u = np.zeros((self.m, self.m))
         self.by_r = np.zeros((self.m, self.m))
-        self.by_mu = np.zeros((nc, d))
-        eye = np.eye(d - 1)
+        self.by_friction = {name: np.zeros((nc, d)) for name in _laws.coefficients(self.problem)}
         for a in range(nc):
             at = slice(d * a, d * a + d)
             if opened[a]:
                 self.by_r[at, at] = np.eye(d)
-                continue
-            if not slides[a]:
-                self.by_u[at, at] = rho[a] * np.eye(d)
-                continue
-            normal, tangent = d * a, slice(d * a + 1, d * a + d)
-            speed = np.linalg.norm(u[a, 1:])
-            # on the border to stick the reaction gives the direction of sliding
-            t = u[a, 1:] / speed if speed > 0 else -z[a, 1:] / (sliding[a] or 1.0)
-            self.by_u[normal, normal] = rho[a]
-            self.by_r[tangent, tangent] = eye
-            self.by_r[tangent, normal] = mu[a] * t
-            turn = mu[a] * r[a, 0] * (eye - np.outer(t, t))
-            self.by_u[tangent, tangent] = turn / speed if speed > 0 else 0 * turn
-            self.by_mu[a, 1:] = -r[a, 0] * t
+            else:
+                self.by_u[d * a, d * a] = rho[a]
+        names = {"t": ("mu",), "s": ("mu_s",), "r": ("mu_r",), "ts": ("mu", "mu", "mu_s")}
+        for group in _laws.groups(self.problem):
+            size = group.part.stop - group.part.start
+            bounds = names[group.name] if size == 3 else names[group.name] * size
+            beyond = _beyond(group, z)
+            self.degenerate |= ~opened & (np.abs(beyond) <= border)
+            slides = (beyond > 0) | ~group.axes.all(axis=1)
+            for a in np.flatnonzero(~opened).tolist():
+                tangent = slice(d * a + group.part.start, d * a + group.part.stop)
+                if not slides[a]:
+                    self.by_u[tangent, tangent] = rho[a] * np.eye(size)
+                    continue
+                e, moved = group.axes[a], u[a, group.part]
+                self.by_r[tangent, tangent] = np.eye(size)
+                if group.uniform:
+                    mu, speed = e[0], np.linalg.norm(moved)
+                    # on the border to stick the reaction gives the direction of sliding
+                    far = z[a, group.part]
+                    unit = moved / speed if speed > 0 else -far / (np.linalg.norm(far) or 1.0)
+                    self.by_r[tangent, d * a] = mu * unit
+                    turn = mu * r[a, 0] * (np.eye(size) - np.outer(unit, unit))
+                    self.by_u[tangent, tangent] = turn / speed if speed > 0 else 0 * turn
+                    self.by_friction[bounds[0]][a, group.part] = -r[a, 0] * unit
+                    continue
+                pull = np.linalg.norm(e * moved)
+                away = moved if pull > 0 else -_across(z[a, group.part], e)
+                length = np.linalg.norm(e * away) or 1.0
+                t = e * e * away / length  # r_g = -r_N t
+                self.by_r[tangent, d * a] = t
+                if pull > 0:
+                    turn = (np.diag(e * e) - np.outer(t, t)) / length
+                    self.by_u[tangent, tangent] = r[a, 0] * turn
+                by_axes = 2 * np.diag(e * away) / length
+                by_axes -= np.outer(t, e * away * away / length**2)
+                for axis, name in enumerate(bounds):
+                    self.by_friction[name][a, group.part] -= r[a, 0] * by_axes[:, axis]
 
     def _solve(self, transposed: bool, right: Array) -> tuple[Array, bool]:
         """Solve by singular values, after rows and columns are scaled to the same size."""
@@ -327,8 +370,9 @@ class _Point:
         velocity = self._velocity(change)
         right = np.zeros(len(self.system))
         law = -self.by_u @ velocity
-        if (mu := change.get("mu")) is not None:
-            law += (self.by_mu * mu[:, None]).reshape(-1)
+        for name, by in self.by_friction.items():
+            if (coefficient := change.get(name)) is not None:
+                law += (by * coefficient[:, None]).reshape(-1)
         right[self.rows["law"]] = law
         for name in ("s", "b"):
             if (value := change.get(name)) is not None:
@@ -370,11 +414,14 @@ class _Point:
         found, unique = self._solve(True, right)
         law = found[self.rows["law"]]
         by_q = by_u - self.by_u.T @ law
-        by_mu = np.einsum("ad,ad->a", self.by_mu, law.reshape(self.nc, self.d))
+        by_friction = {
+            name: np.einsum("ad,ad->a", by, law.reshape(self.nc, self.d))
+            for name, by in self.by_friction.items()
+        }
         joints = -found[self.rows["joints"]] if self.p else None
         problem = self.problem
         nothing: dict[str, Any] = dict.fromkeys(("q", "W", "s", "f", "w", "M", "H", "b"))
-        if isinstance(problem, _core.LocalProblem):
+        if isinstance(problem, _laws.Local):
             mine = {"q": by_q, "W": _on_pattern(problem.W, by_q, self.r), "s": joints}
         else:
             assert self.v is not None
@@ -388,7 +435,7 @@ class _Point:
                 "b": joints,
             }
         return Gradient(
-            mu=by_mu,
+            **by_friction,
             **(nothing | mine),
             degenerate=self.degenerate,
             unique=unique,

@@ -26,7 +26,7 @@ MOST_CONTACTS: Final = 64  # larger ones are for `auto`, as on the CPU
 # was slower by a third
 FEW_COORDINATES: Final = 12
 SHARED_COPY: Final = 8  # contacts up to which W is copied; from 16 on it is slower by a tenth
-# steps that a problem may take: of a million of 4 to 64 contacts, all but one in 10^5 need under 100
+# steps that a problem may take: of those of docs/results/gpu.csv, all but one need under 100
 MOST_STEPS: Final = 400
 CUDA_DEVICE: Final = 2  # kDLCUDA of DLPack
 
@@ -130,7 +130,8 @@ def sources() -> str:
     if not folder.is_dir():  # a development install
         folder = here.parents[1] / "core" / "embed"
     header, kernel = (
-        (folder / f"proximal_small.{suffix}").read_text(encoding="utf-8") for suffix in ("hpp", "cu")
+        (folder / f"proximal_small.{suffix}").read_text(encoding="utf-8")
+        for suffix in ("hpp", "cu")
     )
     return kernel.replace('#include "proximal_small.hpp"', header.replace("#pragma once", ""))
 
@@ -263,7 +264,7 @@ class _Sizes:
         name = "jacobian" if bodies else "W"
         self.ragged = counts is not None
         if counts is None:
-            square = bodies or matrices.ndim == 3 and matrices.shape[1] == matrices.shape[2]
+            square = bodies or (matrices.ndim == 3 and matrices.shape[1] == matrices.shape[2])
             if matrices.ndim != 3 or not square:
                 shape = "(count, m, coordinates)" if bodies else "(count, m, m)"
                 raise _core.ProblemError(
@@ -272,9 +273,7 @@ class _Sizes:
                 )
             count, m = matrices.shape[:2]
             if m % spacedim:
-                raise _core.ProblemError(
-                    f"{name}: m = {m} is no multiple of spacedim = {spacedim}"
-                )
+                raise _core.ProblemError(f"{name}: m = {m} is no multiple of spacedim = {spacedim}")
             counts = np.full(count, m // spacedim, dtype=np.int64)
         counts = np.asarray(counts)
         if counts.ndim != 1 or counts.dtype.kind not in "iu" or (counts < 0).any():
@@ -462,7 +461,7 @@ def _launch(
 
 
 def _by_columns(cupy: Any, sizes: _Sizes, W: DeviceArray) -> DeviceArray:
-    """Each matrix transposed: lanes that work on neighbouring rows then read neighbouring entries."""
+    """Each matrix transposed: lanes of neighbouring rows then read neighbouring entries."""
     if not sizes.ragged:
         return cupy.ascontiguousarray(W.transpose(0, 2, 1))
     result = cupy.empty_like(W)

@@ -12,6 +12,8 @@ Numbers: TypeAlias = npt.NDArray[np.float64]
 
 # the data of Coulomb's law: matrices, vectors and coefficients, in this order
 FIELDS = ("M", "H", "G", "W", "V", "R", "f", "w", "b", "q", "s", "mu", "mu_r")
+# what spin friction adds; the sketch is without it
+SPIN = ("mu_s",)
 # relative to a matrix's largest entry: a smaller entry may be 0 on another machine
 ROUNDING = 1e-12
 
@@ -26,7 +28,7 @@ def digest(problem: Any) -> str:
     Args:
         problem: any formulation.
     """
-    sha = hashlib.sha256(f"{problem.kind} {problem.spacedim}".encode())
+    sha = hashlib.sha256(_sizes(problem).encode())
     for name, part in parts(problem).items():
         if isinstance(part, np.ndarray):
             sha.update(f" {name} {part.size} ".encode())
@@ -41,12 +43,17 @@ def digest(problem: Any) -> str:
     return sha.hexdigest()
 
 
+def _sizes(problem: Any) -> str:
+    coupled = " coupled" if getattr(problem, "coupled", 0) else ""
+    return f"{problem.kind} {problem.spacedim}{coupled}"
+
+
 def structure(problem: Any) -> str:
     """SHA-256 of a problem's sizes and of the places of its matrices' entries.
 
     Entries below ROUNDING of the largest do not count: a zero on one machine is 1e-17 on another.
     """
-    sha = hashlib.sha256(f"{problem.kind} {problem.spacedim}".encode())
+    sha = hashlib.sha256(_sizes(problem).encode())
     for name, part in parts(problem).items():
         if isinstance(part, np.ndarray):
             sha.update(f" {name} {part.size} ".encode())
@@ -66,6 +73,8 @@ def sketch(problem: Any) -> Numbers:
     """
     sums = np.full((len(FIELDS), 2), np.nan)
     for name, part in parts(problem).items():
+        if name in SPIN:  # stored sketches have a row for each of FIELDS
+            continue
         place, numbers = places(part), part if isinstance(part, np.ndarray) else part.data
         sums[FIELDS.index(name)] = [numbers @ signs(place, k) for k in range(2)]
     return sums
@@ -114,7 +123,7 @@ def parts(problem: Any) -> dict[str, Any]:
     import scipy.sparse as sp  # the import takes a while, and not everyone needs it
 
     found: dict[str, Any] = {}
-    for name in FIELDS:
+    for name in FIELDS + SPIN:
         value = getattr(problem, name, None)
         if value is None:
             continue

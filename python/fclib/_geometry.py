@@ -352,10 +352,15 @@ def carried(
             away = np.linalg.norm(before.point[rest] - now.point[i], axis=1)
             source[i] = rest.pop(int(away.argmin()))
 
-    force, axis = (2, 2) if planar else (3, 1)
+    force, axis = 2 if planar else 3, first_axis(planar, d)
     parts = (slice(0, force), slice(0, force)), (slice(force, d), slice(axis, axis + d - force))
     limits = np.any(now.shape < 0, axis=1)
     return turned(local, source, before.frame, now.frame, parts, limits)
+
+
+def first_axis(planar: bool, d: int) -> int:
+    """The row of a contact's frame for its first moment: y in the plane, T1, or N with spin."""
+    return 2 if planar else 0 if d % 2 == 0 else 1
 
 
 def turned(

@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core, _entry_points
+from fclib import _core, _entry_points, _laws
 from fclib._suggest import nearest
 
 GROUP = "fclib.solvers"
@@ -120,6 +120,20 @@ def solver(
         return function
 
     return decorate
+
+
+def dimensions_of(info: _core.SolverInfo, kind: str) -> list[int]:
+    """The spacedims that a solver takes of problems of a kind."""
+    return dimensions_by_law(info)[_laws.law_of(kind)]
+
+
+def dimensions_by_law(info: _core.SolverInfo) -> dict[str, list[int]]:
+    """The spacedims that a solver takes, by the law of the contacts."""
+    return {
+        "": info.dimensions,
+        "rolling": info.rolling_dimensions,
+        "spin": info.spin_dimensions,
+    }
 
 
 def make_solver(

@@ -12,15 +12,10 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
+from fclib import _core, _laws
 from fclib._registry import find_solver
 
-Problem: TypeAlias = (
-    _core.LocalProblem
-    | _core.LocalRollingProblem
-    | _core.GlobalProblem
-    | _core.GlobalRollingProblem
-)
+Problem: TypeAlias = _laws.Problem
 
 # the types accepted as a solution or a guess
 Given: TypeAlias = _core.Solution | _core.Result | npt.ArrayLike

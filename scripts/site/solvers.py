@@ -67,7 +67,8 @@ def opening_comments(folder: Path) -> dict[str, str]:
 def takes(solver: fclib.SolverInfo) -> str:
     """The problems that a solver takes."""
     plain = [f"{d}D" for d in solver.dimensions]
-    return ", ".join([*plain, *(f"rolling {d}" for d in solver.rolling_dimensions)])
+    rolling = [f"rolling {d}" for d in solver.rolling_dimensions]
+    return ", ".join([*plain, *rolling, *(f"spin {d}" for d in solver.spin_dimensions)])
 
 
 def index(families: dict[str, list[fclib.SolverInfo]]) -> str:

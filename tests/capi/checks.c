@@ -5,8 +5,8 @@
 #include "checks.h"
 
 /* one contact of a ball on a plane, sliding */
-static int columns[] = {0, 1, 2, 3, 4, 5}, rows[] = {0, 1, 2, 3, 4};
-static double one[] = {1, 1, 1, 1, 1};
+static int columns[] = {0, 1, 2, 3, 4, 5, 6}, rows[] = {0, 1, 2, 3, 4, 5};
+static double one[] = {1, 1, 1, 1, 1, 1};
 static struct fclib_matrix identity = {3, 3, 3, columns, rows, one, -1, NULL};
 static double q[] = {-1, 2, 0}, mu[] = {0.5};
 static double u[] = {0, 1.5, 0}, r[] = {1, -0.5, 0}, v[] = {0, 1.5, 0};
@@ -397,6 +397,57 @@ static void rolling(void) {
   free(back);
 }
 
+static void spin(void) {
+  struct fclib_matrix four = {4, 4, 4, columns, rows, one, -1, NULL};
+  double q4[] = {-1, 2, 0, 0.5}, mu_s[] = {0.1};
+  struct fclib_local_spin a = {0};
+  a.W = &four;
+  a.q = q4;
+  a.mu = mu;
+  a.mu_s = mu_s;
+  a.spacedim = 4;
+  CHECK(fclib_validate_local_spin(&a));
+  CHECK(fclib_write_local_spin(&a, path_of("spin")));
+  CHECK(!strcmp(fclib_problem_kind(path_of("spin")), "local_spin"));
+  struct fclib_local_spin* back = fclib_read_local_spin(path_of("spin"));
+  CHECK(back && back->mu_s[0] == 0.1 && !back->mu_r && back->spacedim == 4 && !back->coupled);
+
+  /* it stops falling; friction slows sliding by mu, the turning by mu_s */
+  double r4[] = {1, -0.5, 0, -0.1}, u4[] = {0, 1.5, 0, 0.4};
+  struct fclib_solution s = {NULL, u4, r4, NULL};
+  CHECK(fclib_validate_local_spin_solution(back, &s));
+  CHECK(fclib_merit_local_spin(back, MERIT_2, &s) < 1e-15);
+  CHECK(fclib_write_solution(&s, path_of("spin")));
+  struct fclib_solve_result result;
+  double r[4] = {0}, u[4] = {0};
+  struct fclib_solution found = {NULL, u, r, NULL};
+  for (int coupled = 0; coupled < 2; coupled++) {
+    back->coupled = coupled;
+    CHECK(fclib_solve_local_spin(back, "auto", NULL, &found, &result));
+    CHECK(fclib_merit_local_spin(back, MERIT_2, &found) < 1e-8);
+    CHECK((fabs(r[1] + 0.5) < 1e-6) == !coupled);
+  }
+  CHECK(!fclib_write_siconos_local_spin(back, path_of("text")));
+  SAYS("spin friction");
+  a.coupled = 2;
+  CHECK(!fclib_validate_local_spin(&a));
+  SAYS("/fclib_local_spin/coupled: is 2, but must be 0 or 1");
+  fclib_delete_local_spin(back);
+  free(back);
+
+  /* with rolling it has six components */
+  struct fclib_matrix six = {6, 6, 6, columns, rows, one, -1, NULL};
+  double q6[] = {-1, 2, 0, 0.5, 0.5, 0}, mu_r[] = {0.2};
+  a.W = &six;
+  a.q = q6;
+  a.spacedim = 6;
+  a.coupled = 0;
+  CHECK(!fclib_validate_local_spin(&a));
+  SAYS("mu_r");
+  a.mu_r = mu_r;
+  CHECK(fclib_validate_local_spin(&a));
+}
+
 static void solving(void) {
   struct fclib_local a = local();
   struct fclib_global b = global();
@@ -474,6 +525,7 @@ int main(int argc, char** argv) {
   modes();
   validation_and_merits();
   rolling();
+  spin();
   geometry();
   sequence();
   solving();

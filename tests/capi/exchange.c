@@ -6,13 +6,12 @@
  *   exchange merit < words    MERIT_1 of each problem and its solution; the path is not used
  *
  * problem   path kind spacedim matrix matrix matrix vector vector vector vector info solution
- *           guesses, members in the order of the struct, kinds local, global, and local_rolling and
- *           global_rolling (one vector more) unless ONLY_3_1 is defined
- * matrix    "-" or nzmax m n nz p... i... x... info
- * vector    "-" or its numbers, whose count the matrices give
- * info      "-" or texts; for a matrix one text and conditioning, determinant, rank
- * text      "-" or "=" and its bytes in hexadecimal
- * solution  "-" or vectors v u r l;  guesses: their number, and solutions
+ *           guesses, members in the order of the struct, kinds local, global, and unless ONLY_3_1
+ * is defined local_rolling and global_rolling (one vector more), local_spin and global_spin matrix
+ * "-" or nzmax m n nz p... i... x... info vector    "-" or its numbers, whose count the matrices
+ * give info      "-" or texts; for a matrix one text and conditioning, determinant, rank text "-"
+ * or "=" and its bytes in hexadecimal solution  "-" or vectors v u r l;  guesses: their number, and
+ * solutions
  */
 #include <fclib.h>
 #include <stdio.h>
@@ -279,6 +278,16 @@ GLOBAL(global, , )
 #define SHOW_ROLLING show_vector(a->mu_r, m / a->spacedim);
 LOCAL(local_rolling, SHOW_ROLLING, READ_ROLLING)
 GLOBAL(global_rolling, SHOW_ROLLING, READ_ROLLING)
+#define READ_SPIN                                                \
+  a.mu_s = read_vector(m / a.spacedim);                          \
+  a.mu_r = a.spacedim == 6 ? read_vector(m / a.spacedim) : NULL; \
+  a.coupled = read_int();
+#define SHOW_SPIN                                              \
+  show_vector(a->mu_s, m / a->spacedim);                       \
+  if (a->spacedim == 6) show_vector(a->mu_r, m / a->spacedim); \
+  printf(" %d", a->coupled);
+LOCAL(local_spin, SHOW_SPIN, READ_SPIN)
+GLOBAL(global_spin, SHOW_SPIN, READ_SPIN)
 #endif
 
 int main(int argc, char** argv) {
@@ -293,6 +302,8 @@ int main(int argc, char** argv) {
 #ifndef ONLY_3_1
       if (!strcmp(kind, "local_rolling")) show_local_rolling(path, what);
       if (!strcmp(kind, "global_rolling")) show_global_rolling(path, what);
+      if (!strcmp(kind, "local_spin")) show_local_spin(path, what);
+      if (!strcmp(kind, "global_spin")) show_global_spin(path, what);
 #endif
     }
     return 0;
@@ -304,6 +315,8 @@ int main(int argc, char** argv) {
 #ifndef ONLY_3_1
     if (!strcmp(kind, "local_rolling")) write_local_rolling(path, merit);
     if (!strcmp(kind, "global_rolling")) write_global_rolling(path, merit);
+    if (!strcmp(kind, "local_spin")) write_local_spin(path, merit);
+    if (!strcmp(kind, "global_spin")) write_global_spin(path, merit);
 #endif
   }
   return 0;

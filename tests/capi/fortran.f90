@@ -198,6 +198,7 @@ contains
     type(fclib_global) :: global
     type(fclib_global_rolling) :: global_rolling
     type(fclib_local_rolling) :: local_rolling
+    type(fclib_local_spin) :: local_spin
     type(fclib_solution) :: solution
     integer :: k, n, m, p, nc
 
@@ -236,6 +237,22 @@ contains
     call check(fclib_validate(local_rolling, solution), "it is valid")
     call fclib_delete(solution)
     call fclib_delete(local_rolling)
+
+    call one_contact(local_spin%W, 4)
+    call fclib_set(local_spin%q, [-1._dp, 2._dp, 0._dp, 1._dp])
+    call fclib_set(local_spin%mu, [0.5_dp])
+    call fclib_set(local_spin%mu_s, [0.1_dp])
+    local_spin%coupled = 1
+    call fclib_allocate(solution, local_spin)
+    call check(fclib_solve(local_spin, "nsgs", solution), "solve a problem with spin")
+    call check(fclib_merit(local_spin, MERIT_2, solution) < 1e-8, "its merit")
+    call check(fclib_write(local_spin, path_of("spin.hdf5")), "write a problem with spin")
+    call fclib_delete(local_spin)
+    call check(fclib_read(path_of("spin.hdf5"), local_spin), "read a problem with spin")
+    call check(local_spin%coupled == 1, "its law")
+    call check(fclib_validate(local_spin, solution), "it is valid")
+    call fclib_delete(solution)
+    call fclib_delete(local_spin)
 
     call one_contact(global_rolling%M, 5)
     call one_contact(global_rolling%H, 5)

@@ -336,7 +336,7 @@ def test_the_fortran_module_is_the_header() -> None:
     module, header = source.read_text(), without_comments((HEADERS / "fclib.h").read_text())
 
     structs = re.findall(r"struct (?:FCLIB_APICOMPILE )?(\w+) \{(.*?)\};", header, re.DOTALL)
-    assert len(structs) == 12
+    assert len(structs) == 14
     for name, body in structs:
         members = [
             (in_fortran(member), member.split()[-1].strip("*"))
@@ -594,8 +594,8 @@ class Words:
     def problem(self) -> tuple[str, str]:
         """The words, and what there is beside the problem ("s" and "g", or neither)."""
         rng = self.rng
-        rolling = self.kind.endswith("rolling")
-        d = int(rng.choice([3, 5] if rolling else [2, 3]))
+        law = self.kind.partition("_")[2]
+        d = int(rng.choice({"": [2, 3], "rolling": [3, 5], "spin": [4, 6]}[law]))
         nc, p = int(rng.integers(0, 5)), int(rng.choice([0, 1, 3]))
         m, n = d * nc, int(rng.integers(1, 9))
         local = self.kind.startswith("local")
@@ -612,7 +612,12 @@ class Words:
                 self.matrix(*shape)
             else:
                 self.add("-")
-        for size in [nc, *([nc] if rolling else []), *((m, p) if local else (n, p, m))]:
+        self.vector(nc)
+        for _ in range({"": 0, "rolling": 1, "spin": 2 if d == 6 else 1}[law]):
+            self.vector(nc)
+        if law == "spin":
+            self.add(int(rng.integers(-3, 4)))
+        for size in (m, p) if local else (n, p, m):
             self.vector(size)
         self.info()
         # 3.1 takes no solution without contacts
@@ -674,7 +679,10 @@ def test_files_go_both_ways(
     both_ways([ours], [brought], kind, 4, folder)
 
 
-@pytest.mark.parametrize("kind", ["local", "global", "local_rolling", "global_rolling"])
+@pytest.mark.parametrize(
+    "kind",
+    ["local", "global", "local_rolling", "global_rolling", "local_spin", "global_spin"],
+)
 def test_files_come_back(
     kind: str, ours: Library, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

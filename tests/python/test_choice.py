@@ -141,7 +141,7 @@ def test_trivial_problems_are_found() -> None:
     assert trivial(linked.replace(q=lifted)) == NO_APPROACH
     # few sweeps solve one contact
     ball = fclib.LocalProblem(spacedim=3, W=np.eye(3), q=[-1.0, 0.1, 0], mu=[0.5])
-    assert select.why_trivial(ball) == "trivial: 1 sweeps of nsgs solve it"
+    assert select.why_trivial(ball) == "trivial: nsgs solves it, sweeps: 1"
 
 
 # ---- the choice
@@ -413,6 +413,19 @@ def test_commands_measure_and_choose_and_go_on(
     assert files
     for row in stay:
         assert fclib.digest(fclib.read(difficulty.path_of(work, row))) == row["digest"]
+
+    # a family that fails is named, and the others are there
+    def fails(*_: object) -> Any:
+        raise ValueError("its states are damaged")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(select, "describes", lambda own, found: "Siconos" not in found.label)
+        broken.setattr(select, "described", fails)
+        one = command("candidates", work, *families)
+    assert one.exit_code == 1
+    assert "simulators/SiconosBoxes: has no candidates" in " ".join(one.output.split())
+    assert {row["label"] for row in select.read_table(work / difficulty.TABLE)} == {"ManySolutions"}
+    assert command("candidates", work, *families).exit_code == 0
     # again, it changes nothing, and a file that was lost comes back
     files[0].unlink()
     again = command("candidates", work, *families)

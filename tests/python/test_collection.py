@@ -1112,20 +1112,20 @@ def test_simulate_writes_a_sequence(tmp_path: Path) -> None:
 
 def test_simulate_leaves_out_what_no_problem_holds_and_says_so(tmp_path: Path) -> None:
     path = tmp_path / "legs.xml"
-    twisted = ROBOT.format(loss=1).replace('mass="2"', 'mass="2" condim="4"')
-    path.write_text(twisted, encoding="utf-8")
+    soft = ROBOT.format(loss=1).replace('mass="2"', 'mass="2" solref="0.05 1"')
+    path.write_text(soft, encoding="utf-8")
     common = ("simulate", path, "--steps", 10, "--out", tmp_path / "out", "--no-pictures")
     refused = invoke(*common, "--strict")
     assert refused.exit_code == 1
-    assert "not supported: torsional friction" in refused.output
+    assert "not supported: solref and solimp" in refused.output
     assert not (tmp_path / "out").exists()
     done = invoke(*common)
     assert done.exit_code == 0, done.output
-    assert "Left out: torsional friction" in done.output
+    assert "Left out: solref and solimp" in done.output
     row = collections.read_catalog(tmp_path / "out").to_pylist()[0]
-    assert row["left_out"] == "torsional friction (condim 4 and 6)"
+    assert row["left_out"] == "solref and solimp (contacts, limits and equalities are rigid)"
     described = read(tmp_path / "out" / row["global_file"]).info.description
-    assert "Left out: torsional friction" in described
+    assert "Left out: solref and solimp" in described
 
 
 def test_simulate_with_controls_and_a_keyframe(

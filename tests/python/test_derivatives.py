@@ -4,13 +4,15 @@ import copy
 import dataclasses
 import pickle
 import warnings
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fclib
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, planted_spin
 
 STEP = 1e-6
 
@@ -19,6 +21,9 @@ def changes(problem: Any, seed: int) -> dict[str, Any]:
     """A change of every datum; of W and M one that keeps the symmetry and the pattern."""
     rng = np.random.default_rng(seed)
     found: dict[str, Any] = {"mu": rng.uniform(size=problem.nc)}
+    for name in ("mu_s", "mu_r"):
+        if getattr(problem, name, None) is not None:
+            found[name] = rng.uniform(size=problem.nc)
     for name in ("q", "s", "f", "w", "b"):
         if getattr(problem, name, None) is not None:
             found[name] = rng.normal(size=getattr(problem, name).shape)
@@ -42,8 +47,22 @@ def moved(problem: Any, change: dict[str, Any], step: float) -> Any:
     return problem.replace(**{name: plus(name, value) for name, value in change.items()})
 
 
+def with_rolling(seed: int, d: int, nc: int, p: int) -> Any:
+    return planted_local(seed=seed, d=d, nc=nc, p=p, rolling=True)
+
+
+def with_spin(seed: int, d: int, nc: int, p: int) -> Any:
+    """D = 4 with p = 1 is the ellipsoid."""
+    law = "ellipsoid" if p else "product"
+    problem, r = planted_spin(law, d, seed, nc=nc, edges=False)
+    problem = problem.replace(W=sp.csr_array(problem.W))
+    return SimpleNamespace(problem=problem, solution=fclib.Solution(r=r))
+
+
 def problems() -> list[Any]:
-    return [
+    laws = [(with_rolling, 3, 0), (with_rolling, 5, 3), (with_spin, 4, 0), (with_spin, 6, 0)]
+    laws.append((with_spin, 4, 1))
+    return [pytest.param(*law, id=f"{law[0].__name__}-{law[1]}-{law[2]}") for law in laws] + [
         pytest.param(kind, d, p, id=f"{kind.__name__[8:]}-{d}D-{'mixed' if p else 'plain'}")
         for kind in (planted_local, planted_global)
         for d in (2, 3)
@@ -62,7 +81,9 @@ def test_forward_is_the_difference_of_solutions(kind: Any, d: int, p: int) -> No
     planted = kind(seed=5, d=d, nc=6, p=p)
     problem = planted.problem
     solution = solved(problem, planted.solution)
-    for seed, names in enumerate((None, "mu", "q", "W", "f", "w", "M", "H", "s", "b")):
+    for seed, names in enumerate(
+        (None, "mu", "mu_s", "mu_r", "q", "W", "f", "w", "M", "H", "s", "b")
+    ):
         change = changes(problem, seed)
         if names is not None:
             change = {name: value for name, value in change.items() if name == names}
@@ -160,9 +181,8 @@ def test_wrong_input_is_refused_by_its_name() -> None:
         fclib.jvp(problem, solution, q=np.zeros(3))
     with pytest.raises(fclib.ProblemError, match="v: has the shape"):
         fclib.vjp(problem, solution, v=np.zeros(3))
-    rolling: Any = planted_local(seed=0, d=5, nc=3, rolling=True)
-    with pytest.raises(fclib.UnsuitableError, match="without rolling"):
-        fclib.vjp(rolling.problem, rolling.solution, r=np.zeros(15))
+    with pytest.raises(fclib.ProblemError, match="mu_s: this problem has no such datum"):
+        fclib.jvp(problem, solution, mu_s=np.zeros(3))
 
 
 @pytest.mark.parametrize(

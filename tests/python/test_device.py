@@ -4,10 +4,10 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-import fake_cupy
 import numpy as np
 import pytest
 
+import fake_cupy
 import fclib
 from fclib import _device
 
@@ -45,7 +45,9 @@ def judged(given: dict[str, Any], found: Any, k: int, spacedim: int = 3) -> floa
     """Merit.error of problem k."""
     of = as_matrices(given)
     problem = fclib.LocalProblem(spacedim=spacedim, W=of["W"][k], q=of["q"][k], mu=of["mu"][k])
-    return fclib.merit(problem, fclib.Solution(r=np.array(found.r[k]), u=np.array(found.u[k]))).error
+    return fclib.merit(
+        problem, fclib.Solution(r=np.array(found.r[k]), u=np.array(found.u[k]))
+    ).error
 
 
 @pytest.mark.parametrize(("nc", "nv", "spacedim"), [(4, 6, 3), (3, 7, 2), (6, 18, 3)])
@@ -60,7 +62,9 @@ def test_each_is_solved_and_judged(nc: int, nv: int, spacedim: int, form: str) -
     assert len(found.unsolved) == 0
     for k in range(40):
         # W in double is not quite that of the bodies
-        assert judged(given, found, k, spacedim) == pytest.approx(found.error[k], rel=1e-3, abs=1e-13)
+        assert judged(given, found, k, spacedim) == pytest.approx(
+            found.error[k], rel=1e-3, abs=1e-13
+        )
 
 
 def test_w_that_is_not_symmetric_is_not_read_the_other_way() -> None:
@@ -81,7 +85,9 @@ def test_numbers_of_contacts_may_vary(form: str, counts: list[int]) -> None:
     matrices = [as_matrices(one) for one in parts]
     expected = fclib.solve_batch(*([one[name][0] for one in matrices] for name in ("W", "q", "mu")))
     if form == "W":
-        flat = {name: np.concatenate([x[name].ravel() for x in matrices]) for name in ("W", "q", "mu")}
+        flat = {
+            name: np.concatenate([x[name].ravel() for x in matrices]) for name in ("W", "q", "mu")
+        }
     else:
         flat = {
             "jacobian": np.concatenate([one["jacobian"][0] for one in parts]),
@@ -134,7 +140,7 @@ def test_what_is_left_goes_to_the_cpu_or_stays() -> None:
 def test_a_guess_saves_steps_and_other_libraries_come_in_by_dlpack() -> None:
     given = on_gpu(bodies(4, 20, 6))
     cold = fclib.solve_batch(**given)
-    foreign = {name: fake_cupy.Foreign(array) for name, array in given.items()}
+    foreign: dict[str, Any] = {name: fake_cupy.Foreign(array) for name, array in given.items()}
     warm = fclib.solve_batch(**foreign, guess=fake_cupy.Foreign(cold.r))
     assert warm.converged.all()
     assert warm.iterations.sum() == 0
@@ -155,7 +161,9 @@ def test_a_full_inverse_mass_is_that_of_its_factor() -> None:
 
 
 def test_no_problems_are_no_trouble() -> None:
-    empty = fclib.solve_batch(*(fake_cupy.as_ours(np.zeros(s)) for s in ((0, 3, 3), (0, 3), (0, 1))))
+    empty = fclib.solve_batch(
+        *(fake_cupy.as_ours(np.zeros(s)) for s in ((0, 3, 3), (0, 3), (0, 1)))
+    )
     assert len(empty) == 0
     assert len(empty.unsolved) == 0
 
@@ -182,7 +190,7 @@ def test_wrong_input_is_refused_by_its_name() -> None:
         with pytest.raises(fclib.ProblemError, match=words):
             fclib.solve_batch(**arguments)
     with pytest.raises(fclib.OptionError, match="unsolved"):
-        fclib.solve_batch(**given, unsolved="maybe")
+        fclib.solve_batch(**given, unsolved="maybe")  # type: ignore[arg-type]
 
 
 def test_without_cupy_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

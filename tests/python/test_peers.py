@@ -25,7 +25,7 @@ import odd_files
 from ball_judge import judge
 from capi_library import library_folder
 from fclib import scenes
-from helpers import dense, planted_global, planted_local
+from helpers import dense, planted_global, planted_local, planted_spin
 
 # prints a file as JSON, every number of it; or writes a problem of known numbers
 PEER = r"""
@@ -281,6 +281,18 @@ def test_libfclib_reads_a_solution_of_reactions_alone(
     fclib.write(tmp_path / "p.hdf5", case.problem, solution)
     seen = json.loads(peer("show", kind, tmp_path / "p.hdf5", "solution"))
     assert_seen(case.problem, solution, seen)
+
+
+@pytest.mark.parametrize("kind", ["local", "global"])
+def test_libfclib_refuses_a_file_of_spin(peer_program: Path, tmp_path: Path, kind: str) -> None:
+    problem, r = planted_spin("product", 4, 0)
+    fclib.write(tmp_path / "spin.hdf5", problem, fclib.Solution(r=r))
+    done = subprocess.run(
+        [peer_program, "show", kind, tmp_path / "spin.hdf5"], capture_output=True, text=True
+    )
+    # it ends its process with an error, as for every file without its group, and does not crash
+    assert done.returncode == 1
+    assert f"fclib_{kind}" in done.stderr
 
 
 def test_libfclib_reads_a_title(peer: Peer, tmp_path: Path) -> None:

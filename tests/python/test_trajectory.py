@@ -432,7 +432,7 @@ RANGES: dict[str, Any] = {
     "BoxesStack": ((6, 300), (1, 200), lambda p: p["size"]),
     "Capsules": ((6, 600), (1, 300), lambda p: 2 * p["radius"]),
     "Chain": ((48, 60), (8, 28), lambda p: p["thickness"]),
-    "KaplasTower": ((72, 864), (48, 1104), lambda p: p["thickness"]),
+    "KaplasTower": ((66, 864), (39, 1104), lambda p: p["thickness"]),
 }
 # penetration of stored states, of the diameter of the smallest body
 DEEPEST = 0.02

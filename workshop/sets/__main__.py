@@ -10,7 +10,7 @@ import typer
 
 import fclib
 from fclib import collections
-from fclib.cli._output import Rows, fail, out
+from fclib.cli._output import Rows, err, fail, out
 from fclib.cli._progress import many_bars
 from fclib.collections import published, ratings
 from workshop.sets import candidates, choose, difficulty, select, sequences
@@ -32,8 +32,6 @@ States = Annotated[
 Version = Annotated[str, typer.Option(help="Version of the lists: a number, higher than before.")]
 Estimate = Annotated[bool, typer.Option("--estimate", help="Say the CPU it needs, and end.")]
 PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
-# what may go wrong with data, in words for the user
-FAULTS = (ImportError, OSError, ValueError, FloatingPointError, MemoryError, fclib.Error)
 
 
 @app.command("candidates")
@@ -60,11 +58,13 @@ def find_candidates(
         return
     try:
         with many_bars() as bars:
-            rows = difficulty.describe(folder, own, bars)
+            rows, failed = difficulty.describe(folder, own, bars)
         count = difficulty.write_problems(folder, rows)
-    except FAULTS as error:
+    except difficulty.FAULTS as error:
         fail(str(error))
     out.print(f"{count} of {len(rows)} candidates stay:  {folder / 'problems'}", highlight=False)
+    for name, reason in failed.items():
+        err.print(f"{name}: has no candidates: {reason}", style="red", highlight=False)
     if results:
         costs = difficulty.known_costs(folder)
         table = [{"family": name, "CPU [s]": f"{costs[name]:.1f}"} for name in sorted(own)]
@@ -74,6 +74,7 @@ def find_candidates(
             title="What the candidates of the sets cost",
             note="Simulation of families without stored states, and features.",
         )
+    raise typer.Exit(int(bool(failed)))
 
 
 @app.command()
@@ -101,7 +102,7 @@ def measure(
         out.print(difficulty.needed(folder, select.LONG, count), highlight=False)
         if count:
             difficulty.run(folder, select.LONG, jobs)
-    except (subprocess.CalledProcessError, *FAULTS) as error:
+    except (subprocess.CalledProcessError, *difficulty.FAULTS) as error:
         fail(str(error))
 
 
@@ -150,7 +151,7 @@ def choose_sets(
             )
             select.publish(sources, choices, name, version, states or package / published.FOLDER)
         select.write_table(table, told)
-    except FAULTS as error:
+    except difficulty.FAULTS as error:
         fail(str(error))
     counts = select.counts_of(chosen)
     out.print(Rows(counts))
@@ -190,7 +191,7 @@ def choose_sequences(
                 )
         choose.archive(target, ["sequences"], version)
         choose.write_list(target / "sequences.json", choices, rule.record() | {"version": version})
-    except FAULTS as error:
+    except difficulty.FAULTS as error:
         fail(str(error))
     for own, numbers in chosen:
         out.print(f"{own} {numbers[0]} to {numbers[-1]}", highlight=False)

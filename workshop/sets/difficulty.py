@@ -17,7 +17,7 @@ import resource
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,7 +36,8 @@ CAMPAIGNS: Final = {
 }
 VARIABLE: Final = "FCLIB_CANDIDATES"  # environment variable: DIR, for the campaigns
 
-Tell = Callable[[str], None]
+# what may go wrong with the data of a family, or with files
+FAULTS: Final = (ImportError, OSError, ValueError, FloatingPointError, MemoryError, _core.Error)
 
 
 def store_of(folder: Path, limit: float) -> Path:
@@ -84,23 +85,31 @@ def estimate(folder: Path, names: Sequence[str]) -> str:
 
 def describe(
     folder: Path, names: Sequence[str], progress: select.Progress | None = None
-) -> list[dict[str, Any]]:
-    """The rows of families, from the table if it has them; it is written after each family."""
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """The rows of families, and why others have none. The table is written after each family.
+
+    A family whose rows the table has is left as it is. One that fails does not stop the others.
+    """
     table = folder / TABLE
     rows = select.read_table(table) if table.is_file() else []
     costs = known_costs(folder)
+    failed: dict[str, str] = {}
     for name in names:
         start = cpu()
-        found = candidates.candidates_of(name, folder, progress=progress)
         own = [row for row in rows if select.folder_of(row) == name]
-        if own and select.describes(own, found):
-            continue
-        rows = [row for row in rows if select.folder_of(row) != name]
-        rows += select.described(found, progress)
+        try:
+            found = candidates.candidates_of(name, folder, progress=progress)
+            if own and select.describes(own, found):
+                continue
+            own = select.described(found, progress)
+        except FAULTS as error:
+            failed[name] = str(error)
+            own = []
+        rows = [row for row in rows if select.folder_of(row) != name] + own
         select.write_table(table, rows)
         costs[name] = cpu() - start
         write_costs(folder / COSTS, costs)
-    return [row for row in select.read_table(table) if select.folder_of(row) in names]
+    return [row for row in select.read_table(table) if select.folder_of(row) in names], failed
 
 
 def write_costs(path: Path, costs: Mapping[str, float]) -> None:

@@ -131,7 +131,7 @@ def why_trivial(local: Any) -> str:
     if (words := trivial(local)) is not None:
         return f"trivial: {words}"
     result = _solve.solve(local, "nsgs", TOLERANCE, max_iterations=SWEEPS)
-    return f"trivial: {result.iterations} sweeps of nsgs solve it" if result.converged else ""
+    return f"trivial: nsgs solves it, sweeps: {result.iterations}" if result.converged else ""
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:
@@ -424,7 +424,8 @@ def standard(rows: Sequence[Row], places: Sequence[int], rule: Rule, chosen: Cho
     taken = np.flatnonzero(solved.x[:count] > 0.5).astype(np.int64)
     for bound, lost in zip(kinds, solved.x[count + groups :], strict=True):
         if lost > 1e-6:
-            chosen.lacking.append(f"standard: {lost:.3g} of {bound.least:.3g}, {bound.name}")
+            of = f" of {bound.least:.3g}" if bound.least else ""
+            chosen.lacking.append(f"standard: {lost:.3g}{of}, {bound.name}")
     tell(some, places, cluster, taken, rule, chosen)
     return [places[k] for k in taken.tolist()]
 
@@ -469,8 +470,8 @@ def balance_of(some: Sequence[Row], rule: Rule) -> list[Bound]:
         few = solves[name] - rule.balance * takes[name]
         many = (1 - rule.balance) * takes[name] - solves[name]
         found += [
-            Bound(f"that {name} solves", few, 0, np.inf),
-            Bound(f"that {name} does not solve", many, 0, np.inf),
+            Bound(f"too few that {name} solves", few, 0, np.inf),
+            Bound(f"too many that {name} solves", many, 0, np.inf),
         ]
     return found
 

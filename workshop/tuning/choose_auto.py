@@ -255,7 +255,7 @@ def after_held(stages: Sequence[str]) -> Callable[[list[str]], list[str]]:
 
     def change(lines: list[str]) -> list[str]:
         rest = [line for line in lines if name_of(line) not in stages]
-        at = place(rest, "associated")
+        at = place(rest, "held bodies") + 1
         return [*rest[:at], *(lines[place(lines, name)] for name in stages), *rest[at:]]
 
     return change
@@ -308,16 +308,15 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
             for value in values
         ]
-    rolling = place(lines, first, 1)
     for value in (1e-6, 1e-5, 1e-3):
-        change = with_rules(rolling, polish=f"{value:g}")
-        result.append(Change(f"{first}, rolling: polish={value:g}", first, change))
-    sweeps = place(lines, "gauss-seidel", 1)
+        change = with_rules(at, polish=f"{value:g}")
+        result.append(Change(f"{first}: polish={value:g}", first, change))
+    sweeps = place(lines, "gauss-seidel")
     for value in (10, 40):
         result.append(
             Change(f"sweeps on the whole: {value}", "gauss-seidel", with_rules(sweeps, limit=value))
         )
-    island = place(lines, "gauss-seidel", 2)
+    island = place(lines, "gauss-seidel", 1)
     for value in (25, 50, 200):
         result.append(
             Change(f"sweeps on islands: {value}", "gauss-seidel", with_rules(island, limit=value))
@@ -333,7 +332,7 @@ def changes(lines: list[str]) -> list[Change]:
     longer = f"{spectral}, longer"
     change = with_rules(place(lines, longer), **{"from": "best"})
     result.append(Change(f"{longer}: from=best", longer, change))
-    polish = place(lines, "proximal newton", 1)
+    polish = place(lines, "proximal newton")
     for below in ("1e-6", "1e-4", "1e-3"):
         result.append(
             Change(f"proximal newton: below={below}", first, with_rules(polish, below=below))
@@ -365,9 +364,9 @@ def changes(lines: list[str]) -> list[Change]:
     result.append(Change(f"{names[near]}: before {longer}", first, change))
     # each of them, then both
     late = ("interior point, smoothed", "semismooth newton")
-    associated = place(lines, "associated")
+    after = place(lines, "held bodies") + 1
     for name in late:
-        change = moved(place(lines, name), associated)
+        change = moved(place(lines, name), after)
         result.append(Change(f"{name}: after held bodies", name, change))
     result.append(Change(f"{' and '.join(late)}: after held bodies", late[0], after_held(late)))
     for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):

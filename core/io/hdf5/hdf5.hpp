@@ -3,6 +3,8 @@
 //   /fclib_local/{spacedim, W/, V/, R/, vectors/{q,mu,s}, info/{title,description,math_info}}
 //   /fclib_global/{spacedim, M/, H/, G/, vectors/{f,w,mu,b}, info/}
 //   /fclib_local_rolling, /fclib_global_rolling: the same, and vectors/mu_r
+//   /fclib_local_spin, /fclib_global_spin: the same, vectors/mu_s, coupled, and vectors/mu_r if
+//   spacedim is 6
 //   /solution/{v,u,r,l}
 //   /guesses/{number_of_guesses, 1/{v,u,r,l}, 2/, ...}
 //   /solutions/{number_of_solutions, error, 1/{v,u,r,l}, 2/, ...}: all known solutions

@@ -74,6 +74,7 @@ ProblemView view_of(const P& problem, const WriteOptions& options, std::list<Mat
       if (field.presence != Presence::required && as_given && a.absent()) return;
       view.members.push_back({field.name, a});
     } else if constexpr (std::is_same_v<Member, Vector>) {
+      if (field.presence == Presence::optional && member.size() == 0) return;
       const std::span<const double> values(member.data(), static_cast<std::size_t>(member.size()));
       view.members.push_back({field.name, values});
     } else {

@@ -8,6 +8,7 @@ namespace fclib::siconos {
 std::vector<Layout> layouts() {
   std::vector<Layout> result;
   for_each_formulation([&]<class P>(std::type_identity<P>) {
+    if (P::spin) return;  // Siconos has no such law
     Layout layout{.kind = P::kind, .rolling = P::rolling, .dimensions = P::dimensions};
     for_each_stored<P, Matrix>([&](const auto&) { ++layout.matrices; });
     result.push_back(layout);

@@ -168,6 +168,10 @@ void write_siconos(const std::string& path, ProblemPointer problem) {
     std::visit(
         [&]<class P>(const P* p) {
           validate(*p);
+          if (P::spin) {
+            throw Error(ErrorKind::unsuitable,
+                        "the problem has spin friction, for which Siconos' text has no place");
+          }
           if (is_mixed(*p)) {
             throw Error(ErrorKind::unsuitable,
                         "the problem has bilateral constraints, for which Siconos' text has no "

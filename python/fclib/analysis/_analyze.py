@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.csgraph import connected_components
 
-from fclib import _core, _digest, _solve
+from fclib import _core, _digest, _laws, _solve
 from fclib.analysis._bounds import least_singular, lower_bound
 from fclib.analysis._certificate import Certificate
 from fclib.analysis._data import (
@@ -166,12 +166,10 @@ class Analysis:
             "nc": problem.nc,
             "islands": self.islands,
             "largest_island": self.largest_island,
-            "mu_min": float(problem.mu.min()) if problem.nc else None,
-            "mu_max": float(problem.mu.max()) if problem.nc else None,
         }
-        if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
-            record["mu_r_min"] = float(problem.mu_r.min()) if problem.nc else None
-            record["mu_r_max"] = float(problem.mu_r.max()) if problem.nc else None
+        for name, values in _laws.coefficients(problem).items():
+            record[f"{name}_min"] = float(values.min()) if problem.nc else None
+            record[f"{name}_max"] = float(values.max()) if problem.nc else None
         for name in self.nnz:
             record[f"nnz_{name}"] = self.nnz[name]
             record[f"sparsity_{name}"] = self.sparsity[name]
@@ -421,7 +419,7 @@ def uniqueness(
     if constant < 1:
         reason = f"the fixed point on mu ||u_T|| is a contraction, of {constant:.2g}"
         return Uniqueness("unique", reason, constant, full)
-    frictionless = not any(mu.any() for mu, _ in data.friction)
+    frictionless = not any(group.axes.any() for group in data.friction)
     if frictionless and symmetric and sign.word in DEFINITE[:2]:
         return Uniqueness("unique", "the problem without friction is convex", constant, full)
     if np.isnan(constant):
@@ -446,14 +444,14 @@ def _contraction(data: Data, reduced: Reduced, dense: int) -> float:
     """sqrt(lambda_max(D W_TT D) lambda_max((W^-1)_NN)), D the coefficients of friction.
 
     r(s) minimises 1/2 r.W r + (q + E s).r over K, so that ||r - r'||_W <= ||E (s - s')||_W^-1, and
-    the change of mu ||u_T|| is at most ||D W_T W^-1/2|| times that. With two groups of components
-    (rolling) the sum of their norms costs a factor of sqrt(2).
+    the change of mu ||u_T|| is at most ||D W_T W^-1/2|| times that. With several groups of
+    components (spin, rolling) the sum of their norms costs the root of their number.
     """
     d = data.d
     weights = np.zeros(data.problem.m)
-    for mu, part in data.friction:
-        for k in range(d)[part]:
-            weights[k::d] = mu
+    for group in data.friction:
+        for axis, k in zip(group.axes.T, range(d)[group.part], strict=True):
+            weights[k::d] = axis
     normal = np.arange(data.problem.m) % d == 0
     worst = 0.0
     W = reduced.W.tocsr()

@@ -27,7 +27,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
 
-from fclib import _core, _digest, _solve
+from fclib import _core, _digest, _laws, _solve
 from fclib._regular import regular
 from fclib.analysis._data import Array
 
@@ -115,7 +115,7 @@ def _system(problem: _solve.Problem, used: set[int]) -> _System:
         if k in used and value:
             to[k].append((row, Fraction(value)))
 
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         for row, col, value in _entries(problem.H):
             if col % d == 0:
                 add_term(zero, row, col // d, value)
@@ -154,24 +154,37 @@ def _sum(
 
 def _outside(problem: _solve.Problem, a: int, part: Sequence[Fraction]) -> float:
     """An upper bound of the distance of a contact's part from K*; 0 exactly if it is inside."""
-    d = problem.spacedim
-    groups = [(problem.mu, slice(1, d))]
-    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
-        half = (d + 1) // 2
-        groups = [(problem.mu, slice(1, half)), (problem.mu_r, slice(half, d))]
     normal = part[0]
     squares = [
-        Fraction(float(mu[a])) ** 2 * sum((x * x for x in part[own]), Fraction())
-        for mu, own in groups
+        sum(
+            (
+                (Fraction(float(axis)) * x) ** 2
+                for axis, x in zip(group.axes[a], part[group.part], strict=True)
+            ),
+            Fraction(),
+        )
+        for group in _laws.groups(problem)
     ]
-    if normal >= 0:
-        # n >= sqrt(s) + sqrt(t), without roots
-        rest = normal * normal - sum(squares)
-        if rest >= 0 and (len(squares) == 1 or rest * rest >= 4 * squares[0] * squares[1]):
-            return 0.0
+    if _at_least_roots(normal, squares):
+        return 0.0
     size = _root(sum((x * x for x in part), Fraction()))
     outside = nextafter(sum(map(_root, squares)) - float(normal), inf)
     return max(5e-324, min(size, outside * (1 + 1e-12)) if outside > 0 else size)
+
+
+def _at_least_roots(x: Fraction, squares: Sequence[Fraction]) -> bool:
+    """Whether x is at least the sum of the roots of at most three numbers, without roots."""
+    if x < 0:
+        return False
+    if len(squares) < 2:
+        return x * x >= sum(squares)
+    *two, last = [Fraction(), *squares][-3:]
+    # x - sqrt(last) >= 0, and its square less the sum of the two is at least 2 sqrt(their product):
+    # rest >= sqrt(s) + sqrt(t)
+    rest = x * x + last - sum(two)
+    s, t = 4 * x * x * last, 4 * two[0] * two[1]
+    left = rest * rest - s - t
+    return x * x >= last and rest >= 0 and left >= 0 and left * left >= 4 * s * t
 
 
 def _root(x: Fraction) -> float:
@@ -227,7 +240,7 @@ def _check(problem: _solve.Problem, exact_y: Numbers, exact_z: Numbers) -> Certi
         raise CertificateError(
             f"-(y . q_N + z . s) is {float(gain):.3g}, which must be positive{where}"
         )
-    if isinstance(problem, (_core.LocalProblem, _core.LocalRollingProblem)):
+    if isinstance(problem, _laws.Local):
         size = float(np.linalg.norm(problem.q)) * sqrt(
             sum(float(one) ** 2 for one in exact_y.values())
         )
@@ -239,7 +252,7 @@ def _check(problem: _solve.Problem, exact_y: Numbers, exact_z: Numbers) -> Certi
     rest, _ = _sum(system.zero, x)
     if rest:
         row, value = max(rest.items(), key=lambda item: abs(item[1]))
-        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        if isinstance(problem, _laws.Global):
             touching = [k for k in exact_y if any(one == row for one, _ in system.zero.get(k, []))]
             where = f"contact {touching[0]}" if touching else "a bilateral constraint"
             raise CertificateError(

@@ -64,45 +64,51 @@ class Program:
 
 
 def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -> None:
-    """A x + c in K*, for all contacts: u_N >= mu ||u_T|| (+ mu_r ||u_R||).
+    """A x + c in K*, for all contacts: u_N >= mu ||u_T||, or the sum over groups.
 
     Args:
         program: receives the constraints.
         data: the problem.
         A: (m, number of unknowns of the program).
         c: (m,).
-        first: place of the first unknown that shares u_N between sliding and rolling: nc of them
-            with rolling friction, otherwise none.
+        first: place of the first unknown that shares u_N between the groups: nc of them for each
+            group but the last.
     """
     d, nc = data.d, data.problem.nc
     A = sp.csr_array(A)
-    share = sp.csr_array((nc, program.size))
-    if len(data.friction) > 1:
-        share = sp.csr_array(
-            (np.ones(nc), (np.arange(nc), first + np.arange(nc))), shape=(nc, program.size)
-        )
-        program.nonnegative(share, np.zeros(nc))
-        program.nonnegative(A[::d] - share, c[::d])
-    for number, (mu, part) in enumerate(data.friction):
-        # with rolling, the first cone gets the share and the second one the rest
-        if len(data.friction) == 1:
-            top, constant = A[::d], c[::d]
-        elif number == 0:
-            top, constant = share, np.zeros(nc)
+    rest, constant = A[::d], c[::d]
+    for number, group in enumerate(data.friction):
+        # each cone gets its share, and the last one the rest
+        if number + 1 < len(data.friction):
+            own = first + nc * number + np.arange(nc)
+            top = sp.csr_array((np.ones(nc), (np.arange(nc), own)), shape=(nc, program.size))
+            known = np.zeros(nc)
+            rest = rest - top
+            program.nonnegative(top, known)
+            if number + 2 == len(data.friction):
+                program.nonnegative(rest, constant)
         else:
-            top, constant = A[::d] - share, c[::d]
-        without = np.flatnonzero(mu == 0)
-        program.nonnegative(top[without], constant[without])
-        contacts = np.flatnonzero(mu > 0)
-        components = list(range(d))[part]
+            top, known = rest, constant
+        resists = group.axes.any(axis=1)
+        without = np.flatnonzero(~resists)
+        program.nonnegative(top[without], known[without])
+        contacts = np.flatnonzero(resists)
+        components = list(range(d))[group.part]
+        axes = group.axes[contacts].T
         size = 1 + len(components)
-        # rows contact by contact: the normal one, then mu times the tangential ones
+        # rows contact by contact: the normal one, then the others times their half-axes
         stacked = sp.vstack(
             [top[contacts]]
-            + [sp.diags_array(mu[contacts]) @ A[d * contacts + k] for k in components]
+            + [
+                sp.diags_array(axis) @ A[d * contacts + k]
+                for axis, k in zip(axes, components, strict=True)
+            ]
         )
         values = np.concatenate(
-            [constant[contacts], *(mu[contacts] * c[d * contacts + k] for k in components)]
+            [
+                known[contacts],
+                *(axis * c[d * contacts + k] for axis, k in zip(axes, components, strict=True)),
+            ]
         )
         order = np.arange(size * contacts.size).reshape(size, -1).T.ravel()
         program.second_order(sp.csr_array(stacked)[order], values[order], size)
@@ -110,4 +116,4 @@ def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -
 
 def shares(data: Data) -> int:
     """The number of unknowns that add_dual_cones needs."""
-    return data.problem.nc if len(data.friction) > 1 else 0
+    return data.problem.nc * (len(data.friction) - 1)

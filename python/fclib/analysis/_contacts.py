@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 from fclib.analysis._data import Array, Data
 
 
 def completed(data: Data, solution: _core.Solution) -> tuple[Array, Array]:
     """R and u, recomputed from the data."""
     problem, r = data.problem, solution.r
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         return r, data.matrices["H"].T @ velocity(problem, data, solution) + problem.w
     u = data.W @ r + data.local.q
     if solution.l is not None and "V" in data.matrices:
@@ -23,9 +23,7 @@ def completed(data: Data, solution: _core.Solution) -> tuple[Array, Array]:
     return r, u
 
 
-def velocity(
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem, data: Data, solution: _core.Solution
-) -> Array:
+def velocity(problem: _laws.Global, data: Data, solution: _core.Solution) -> Array:
     """The generalised velocity: the solution's, or the one that follows from its reactions."""
     if solution.v is not None:
         return solution.v
@@ -50,11 +48,11 @@ def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[n
         solution: its solution; u is recomputed from the data, never taken from the solution.
 
     Returns:
-        A structured array (nc,): contact, island, mu (and mu_r with rolling), status (open, stick
-        or slide, as in Merit), r_n and r_t [N s], u_n and u_t [m/s] (and r_r, u_r with
-        rolling), used (||r_T|| / (mu r_N), nan without friction or reaction), error
-        (||r - P_K(r - u^)|| of the contact, [N s] + [m/s] as in the merit), cone [N s] and
-        dual_cone [m/s] (distances from K and K*), dissipated [J] (-r . u).
+        A structured array (nc,): contact, island, mu (and mu_r with rolling, mu_s with spin),
+        status (open, stick or slide, as in Merit), r_n and r_t [N s], u_n and u_t [m/s] (and r_r,
+        u_r with rolling, r_s, u_s with spin), used (||r_T|| / (mu r_N), nan without friction or
+        reaction), error (||r - P_K(r - u^)|| of the contact, [N s] + [m/s] as in the merit), cone
+        [N s] and dual_cone [m/s] (distances from K and K*), dissipated [J] (-r . u).
 
     Raises:
         fclib.ProblemError: problem or solution is not valid.
@@ -64,19 +62,17 @@ def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[n
     d, nc = data.d, problem.nc
     r, u = solution.r, each["u"]
     rows, speeds = r.reshape(nc, d), u.reshape(nc, d)
-    parts = {"t": data.friction[0]}
-    if len(data.friction) > 1:
-        parts["r"] = data.friction[1]
+    parts = _laws.parts(problem)
+    coefficients = _laws.coefficients(problem)
     columns: dict[str, Any] = {
         "contact": np.arange(nc, dtype=np.int32),
         "island": data.local.islands().contact,
-        "mu": data.local.mu,
-        **({"mu_r": parts["r"][0]} if "r" in parts else {}),
+        **coefficients,
         "status": each["status"],
         "r_n": rows[:, 0],
-        **{f"r_{k}": np.linalg.norm(rows[:, part], axis=1) for k, (_, part) in parts.items()},
+        **{f"r_{k}": np.linalg.norm(rows[:, part], axis=1) for k, part in parts.items()},
         "u_n": speeds[:, 0],
-        **{f"u_{k}": np.linalg.norm(speeds[:, part], axis=1) for k, (_, part) in parts.items()},
+        **{f"u_{k}": np.linalg.norm(speeds[:, part], axis=1) for k, part in parts.items()},
     }
     limit = data.local.mu * rows[:, 0]
     columns["used"] = np.divide(
@@ -133,7 +129,7 @@ def energy(problem: _solve.Problem, solution: _core.Solution) -> Energy:
     q = data.local.q
     work = float(r @ (u + q)) / 2
     nan = float("nan")
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         M = data.matrices["M"]
         v, still = velocity(problem, data, solution), _velocity_of(data, problem.f)
         kinetic, free = float(v @ (M @ v)) / 2, float(still @ (M @ still)) / 2

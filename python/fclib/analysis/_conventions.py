@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 from fclib.analysis._data import columns
 
 MOST: Final = 0.9  # least share of the contacts that must show a sign
@@ -30,7 +30,7 @@ def conventions(problem: _solve.Problem) -> list[str]:
 
     A global problem with more contacts than LARGEST is not checked.
     """
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         if problem.nc > LARGEST:
             return []
         try:
@@ -40,7 +40,7 @@ def conventions(problem: _solve.Problem) -> list[str]:
     else:
         local = problem
     d, nc = local.spacedim, local.nc
-    force = 2 if d == 2 or (d == 3 and local.kind.endswith("rolling")) else 3
+    force = _laws.of_force(local.kind, d)
     diagonal = columns(local.W).diagonal().reshape(nc, d)[:, :force]
     q = np.asarray(local.q).reshape(nc, d)[:, :force]
     # limits have no tangents

@@ -11,15 +11,15 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.linalg import cholesky, solve_triangular
 
-from fclib import _core, _solve
+from fclib import _laws, _solve
 from fclib._symmetry import SYMMETRIC as SYMMETRIC
 from fclib._symmetry import asymmetry as asymmetry
 from fclib._symmetry import columns as columns
 from fclib._symmetry import largest as largest
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
-Global: TypeAlias = _core.GlobalProblem | _core.GlobalRollingProblem
+Local: TypeAlias = _laws.Local
+Global: TypeAlias = _laws.Global
 
 DENSE = 2000  # largest side of a matrix that is treated densely
 EPS = float(np.finfo(float).eps)
@@ -78,7 +78,7 @@ class Data:
     @classmethod
     def of_problem(cls, problem: _solve.Problem) -> Data:
         """Raises fclib.UnsuitableError if M is singular."""
-        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        if isinstance(problem, _laws.Global):
             return cls(problem, problem.condense())
         return cls(problem, problem)
 
@@ -115,9 +115,7 @@ class Data:
         if max(self.problem.n, self.problem.m, self.problem.p) > limit:
             return None
         problem = self.problem
-        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)) and (
-            asymmetry(self.matrices["M"]) <= SYMMETRIC
-        ):
+        if isinstance(problem, _laws.Global) and (asymmetry(self.matrices["M"]) <= SYMMETRIC):
             M = self.matrices["M"].toarray()
             try:
                 factor = cholesky((M + M.T) / 2, lower=True)
@@ -162,22 +160,17 @@ class Data:
         return asymmetry(self.W) <= SYMMETRIC
 
     @property
-    def friction(self) -> list[tuple[Array, slice]]:
-        """The friction coefficients, each with the components of a contact that it bounds."""
-        d = self.d
-        if isinstance(self.local, _core.LocalRollingProblem):
-            half = (d + 1) // 2
-            return [(self.local.mu, slice(1, half)), (self.local.mu_r, slice(half, d))]
-        return [(self.local.mu, slice(1, d))]
+    def friction(self) -> list[_laws.Group]:
+        """The groups of components that friction bounds."""
+        return _laws.groups(self.local)
 
     def resistance(self, u: Array) -> Array:
-        """Mu ||u_T|| (+ mu_r ||u_R||) of each contact."""
+        """What friction adds to u_N in u^ of each contact: mu ||u_T||, or the sum over groups."""
         parts = u.reshape(-1, self.d)
-        terms = [mu * np.linalg.norm(parts[:, part], axis=1) for mu, part in self.friction]
-        return np.asarray(np.sum(terms, axis=0))
+        return np.asarray(np.sum([group.resistance(parts) for group in self.friction], axis=0))
 
     def dual_margin(self, u: Array) -> Array:
-        """The depth of each contact's u inside K*: u_N - mu ||u_T|| (- mu_r ||u_R||)."""
+        """The depth of each contact's u inside K*: u_N less what friction adds in u^."""
         return np.asarray(u[:: self.d] - self.resistance(u))
 
     @property

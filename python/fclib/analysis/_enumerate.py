@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 from fclib.analysis._data import EPS, Array, columns, norm
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError, Table, integers
 from fclib.analysis._spatial import one_contact
@@ -304,7 +304,7 @@ class _Whole:
     def solution(self, whole: dict[int, Fraction]) -> _core.Solution:
         """The values of all unknowns, in doubles."""
         problem, m = self.problem, self.problem.m
-        bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+        bodies = isinstance(problem, _laws.Global)
         n = problem.n if bodies else 0
         exact = [whole.get(k, Fraction()) for k in range(2 * m + n + problem.p)]
         values = np.array([float(max(-LARGEST, min(LARGEST, value))) for value in exact])
@@ -461,7 +461,7 @@ def _equations(problem: _solve.Problem) -> tuple[list[Equation], list[int], set[
         ):
             put(row + i, column + j, sign * value)
 
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         n = problem.n
         velocity, bilateral = 2 * m, 2 * m + n
         dynamics = add(n, problem.f)
@@ -503,10 +503,11 @@ def qualifies(problem: _solve.Problem) -> str:
     if problem.n + problem.p > MOST_UNKNOWNS:
         return f"n + p is above {MOST_UNKNOWNS}"
     rubbing = problem.mu > 0
-    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
-        rubbing = rubbing | (problem.mu_r > 0)
+    if law := _laws.law_of(problem.kind):
+        for values in _laws.coefficients(problem).values():
+            rubbing = rubbing | (values > 0)
         if rubbing.any():
-            return "the contacts roll with friction"
+            return f"the contacts have friction of {law}"
     elif problem.spacedim == 3 and rubbing.any():
         if problem.nc == 1:
             return ""
@@ -764,7 +765,7 @@ class _Search:
 
 def _speed(problem: _solve.Problem) -> float:
     """||(q, s)||; for a global problem, of its local form."""
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         problem = problem.condense()
     return norm([*problem.q, *(() if problem.s is None else problem.s)])
 

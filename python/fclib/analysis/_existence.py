@@ -26,7 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 from fclib.analysis._certificate import Certificate, CertificateError, check, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
@@ -204,7 +204,7 @@ def slater(
         return Slater(None, np.nan, None, "left out: the conic program")
     own = shares(data)
     k = A.shape[1]
-    program = Program(k + 1 + own)  # x, t and the unknowns of rolling
+    program = Program(k + 1 + own)  # x, t and the shares of the groups
     top = sp.csr_array((np.full(nc, -1.0), (d * np.arange(nc), np.zeros(nc, int))), (d * nc, 1))
     row_scale = abs(A.data).max(initial=0.0) or 1.0
     map_ = sp.hstack([A / row_scale, top, sp.csr_array((d * nc, own))])
@@ -228,9 +228,9 @@ def slater(
 def reachable(data: Data) -> tuple[sp.csr_array, Array, sp.csr_array, Array]:
     """A, c, B, e: velocities are A x + c for all x with B x = e."""
     problem, local = data.problem, data.local
-    bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+    bodies = isinstance(problem, _laws.Global)
     if bodies and asymmetry(data.matrices["M"]) <= SYMMETRIC:
-        assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+        assert isinstance(problem, _laws.Global)
         G, b = data.matrices.get("G"), problem.b
         if G is None or b is None:
             return data.matrices["H"].T.tocsr(), problem.w, _nothing(problem.n), np.zeros(0)
@@ -306,7 +306,7 @@ def existence(
     solution, error, proof = None, float("nan"), None
     why = ""
     agreed = ""  # the reason why other joints are used than those of the data
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         found = problem.consistent()
         agreed = found[1] if found is not None else ""
     limit = min(time_limit, LOOK) if condition.holds else time_limit

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from scipy.linalg import qr
 from scipy.sparse.csgraph import connected_components
 
-from fclib import _core
+from fclib import _laws
 from fclib.analysis._bounds import dot, exact_rows, least_singular, root_above
 from fclib.analysis._data import DENSE, Array, Data
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError
@@ -88,7 +88,7 @@ def joints_of(data: Data, time_limit: float = EXACT) -> Joints:
     problem = data.problem
     if problem.p == 0:
         return Joints(sp.csr_array((0, 0)), np.zeros(0))
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         assert problem.b is not None
         return joints_of_rows(sp.csr_array(data.matrices["G"].T), -problem.b, time_limit)
     assert problem.s is not None

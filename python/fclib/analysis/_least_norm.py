@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
 
-from fclib import _core
+from fclib import _core, _laws
 from fclib.analysis._conic import Program
 from fclib.analysis._contacts import completed, velocity
 from fclib.analysis._data import DENSE, EPS, Array, Data
@@ -80,7 +80,7 @@ def complete(data: Data, solution: _core.Solution) -> _core.Solution:
     """The solution with u recomputed, and with v for a global problem."""
     problem = data.problem
     _, u = completed(data, solution)
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         v = velocity(problem, data, solution)
         return solution.replace(v=v, u=data.matrices["H"].T @ v + problem.w)
     return solution.replace(u=u)
@@ -155,7 +155,12 @@ def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Ar
     program = Program(size)
     program.equal(A, A @ start)
     at = faces.sticking
-    limits = [(mu[faces.contacts[at]], list(range(d))[part]) for mu, part in data.friction]
+    if not all(group.uniform for group in data.friction):
+        return None
+    limits = [
+        (group.coefficient[faces.contacts[at]], list(range(d))[group.part])
+        for group in data.friction
+    ]
     for mu, components in limits:
         stacked = sp.vstack(
             [sp.diags_array(mu) @ B[d * at], *(B[d * at + k] for k in components)], format="csr"

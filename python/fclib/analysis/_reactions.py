@@ -136,21 +136,23 @@ def faces_of(data: Data, solution: _core.Solution, error: float) -> Faces:
         ray = [(N, 1.0)]
         free: list[int] = []
         inside = bool(reaction[a, 0] > least)
-        for mu, part in data.friction:
-            moving, pull = speed[a, part], reaction[a, part]
-            size = float(np.linalg.norm(moving))
-            components = range(d)[part]
-            limit = float(mu[a]) * float(reaction[a, 0])
-            if not mu[a] > 0:
+        for group in data.friction:
+            axes = group.axes[a]
+            borne = np.flatnonzero(axes > 0)
+            if not borne.size:
                 continue
-            if size > threshold:
-                ray += [
-                    (N + k, -float(mu[a] * x) / size)
-                    for k, x in zip(components, moving, strict=True)
-                ]
+            moving, pull = speed[a, group.part], reaction[a, group.part]
+            components = np.arange(d)[group.part]
+            if float(np.linalg.norm(moving)) > threshold:
+                # against the sliding, on the boundary of the section r_N = 1
+                way = axes * axes * moving / np.linalg.norm(axes * moving)
+                if group.uniform:
+                    way = axes * moving / np.linalg.norm(moving)
+                ray += [(N + int(k), -float(x)) for k, x in zip(components, way, strict=True)]
                 continue
-            free += [N + k for k in components]
-            inside = inside and bool(np.linalg.norm(pull) < (1 - INSIDE) * limit)
+            free += [N + int(k) for k in components[borne]]
+            share = np.linalg.norm(pull[borne] / axes[borne])
+            inside = inside and bool(share < (1 - INSIDE) * reaction[a, 0])
         at = len(inner)
         entries += [(row, at, value) for row, value in ray]
         entries += [(row, at + 1 + k, 1.0) for k, row in enumerate(free)]

@@ -271,8 +271,7 @@ def _confirm(
 
 
 def _takes(info: _core.SolverInfo, data: Data) -> bool:
-    rolling = len(data.friction) > 1
-    return data.d in (info.rolling_dimensions if rolling else info.dimensions)
+    return data.d in _registry.dimensions_of(info, data.problem.kind)
 
 
 def _rounded(solution: _core.Solution) -> _core.Solution:

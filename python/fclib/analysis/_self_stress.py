@@ -35,7 +35,7 @@ import scipy.sparse as sp
 from scipy.linalg import qr
 from scipy.sparse.linalg import lsmr, spsolve
 
-from fclib import _core
+from fclib import _laws
 from fclib.analysis._bounds import (
     Exact,
     below,
@@ -114,7 +114,7 @@ def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress
     if not np.isfinite(x).all():
         return None, "its numbers are too large or too small for doubles"
     off, delta, size = 0.0, 0.0, 0.0
-    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         M = data.matrices["M"]
         if (M != M.T).nnz or not lower_bound(M) > 0:
             return None, "M is not shown to be symmetric positive definite"
@@ -150,7 +150,7 @@ def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress
 def _free(data: Data, joints: Joints) -> Array:
     """The velocity of a global problem without contact reactions."""
     problem = data.problem
-    assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+    assert isinstance(problem, _laws.Global)
     M = data.matrices["M"]
     if not joints.kept.size:
         return np.asarray(spsolve(M, problem.f))
@@ -174,7 +174,7 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
         steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), its squares may overflow doubles
         if off:
             left -= Fraction(off) * length(rows[d * a])
-        for mu, part in data.friction:
+        for mu, part in _laws.boxes(data.local, inner=False):
             friction = root_above(sum((t * t for t in u[part]), Fraction()))
             if off:
                 friction += Fraction(off) * sum(
@@ -207,7 +207,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     unknown = sp.eye_array(size, format="csr")
     normal = unknown[d * np.arange(nc)] - t
     program.nonnegative(normal, np.zeros(nc))
-    for mu, part in data.friction:
+    for mu, part in _laws.boxes(data.local, inner=True):
         components = list(range(d))[part]
         length = 1 + len(components)
         stacked = sp.vstack(
@@ -227,7 +227,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
         return None, "no reactions that move nothing were found"
     # frictionless contacts have only their normal reaction
     columns = [d * a for a in kept.tolist()]
-    for mu, part in data.friction:
+    for mu, part in _laws.boxes(data.local, inner=True):
         columns += [d * a + k for a in kept.tolist() if mu[a] > 0 for k in range(d)[part]]
     columns = [*sorted(columns), *range(own, own + extra)]
     x = _in_kernel(B[:, columns], y[columns])
@@ -238,7 +238,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     margins = []
     for a in kept.tolist():
         r = [place.get(d * a + k, Fraction()) for k in range(d)]
-        for mu, part in data.friction:
+        for mu, part in _laws.boxes(data.local, inner=True):
             friction = root_above(sum((one * one for one in r[part]), Fraction()))
             margins.append(Fraction(float(mu[a])) * r[0] - friction)
             if mu[a] > 0:
@@ -260,7 +260,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
 
 def _moved(data: Data) -> sp.csr_array:
     """B of B (r, l) = 0: the motion by reactions, and by those of joints."""
-    if isinstance(data.problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+    if isinstance(data.problem, _laws.Global):
         parts = [data.matrices["H"]] + ([data.matrices["G"]] if "G" in data.matrices else [])
         return sp.csr_array(sp.hstack(parts))
     if "V" not in data.matrices:

@@ -565,7 +565,7 @@ def _solvers(
             origin=info.origin,
             label=str(entries.get("label", "")),
             about=described(info),
-            dimensions=(tuple(info.dimensions), tuple(info.rolling_dimensions)),
+            dimensions=_registry.dimensions_by_law(info),
         )
         if choice.title in choices:
             raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")
@@ -596,6 +596,7 @@ def described(info: _core.SolverInfo) -> str:
             "citation": info.citation,
             "dimensions": list(info.dimensions),
             "rolling": list(info.rolling_dimensions),
+            "spin": list(info.spin_dimensions),
             "options": options,
         },
         sort_keys=True,

@@ -9,12 +9,14 @@ the original problem.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+
+from fclib import _laws
 
 # the unit lies between 1 / FACTOR and FACTOR; a power of 2 would not change the rounding
 FACTOR = 10.0
@@ -34,10 +36,11 @@ class Copy:
         draw = np.random.default_rng([number, problem.nc])
         self.unit = float(FACTOR ** draw.uniform(-1.0, 1.0))
         order = draw.permutation(problem.nc)
-        self.turn = turned(draw, order, problem.spacedim, problem.kind.endswith("rolling"))
-        changes: dict[str, Any] = {"mu": problem.mu[order], "contacts": None, "bodies": None}
-        if problem.kind.endswith("rolling"):
-            changes["mu_r"] = problem.mu_r[order]
+        parts = list(_laws.parts(problem).values())
+        self.turn = turned(draw, order, problem.spacedim, parts)
+        changes: dict[str, Any] = {"contacts": None, "bodies": None}
+        for name, values in _laws.coefficients(problem).items():
+            changes[name] = values[order]
         local = problem.kind.startswith("local")
         for name, matrix in (("W", "both"), ("V", "rows")) if local else (("H", "columns"),):
             if (given := getattr(problem, name)) is not None:
@@ -69,23 +72,35 @@ class Copy:
         return found
 
 
-def turned(draw: np.random.Generator, order: npt.NDArray[np.int64], d: int, rolling: bool) -> Any:
+def turned(
+    draw: np.random.Generator, order: npt.NDArray[np.int64], d: int, parts: Sequence[slice]
+) -> Any:
     """The orthogonal matrix (m, m) that puts contacts into an order and turns their frames.
 
-    Planar ones are mirrored, or not.
+    Planar ones are mirrored, or not. The spin stays as it is: it is about the normal.
+
+    Args:
+        draw: random numbers.
+        order: the contacts in their new order.
+        d: components of a contact.
+        parts: the groups of tangential components.
     """
     nc = len(order)
     blocks = np.zeros((nc, d, d))
     blocks[:, 0, 0] = 1.0
-    pairs = [(1, 2), (3, 4)] if rolling and d == 5 else [(1, 2)] if d == 3 and not rolling else []
+    pairs = [(part.start, part.start + 1) for part in parts if part.stop - part.start == 2]
+    alone = [part.start for part in parts if part.stop - part.start == 1]
     angle = draw.uniform(0.0, 2 * np.pi, nc)
     for first, second in pairs:
         blocks[:, first, first] = blocks[:, second, second] = np.cos(angle)
         blocks[:, first, second], blocks[:, second, first] = -np.sin(angle), np.sin(angle)
     if not pairs:
         sign = draw.choice([-1.0, 1.0], nc)
-        for component in range(1, d):
+        for component in alone:
             blocks[:, component, component] = sign
+    else:
+        for component in alone:
+            blocks[:, component, component] = 1.0
     if nc == 0:
         return sp.csr_array((0, 0))
     whole = sp.bsr_array((blocks, order, np.arange(nc + 1)), shape=(d * nc, d * nc))

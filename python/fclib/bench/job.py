@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from fclib import _laws
 from fclib._solve import MeritKind
 from fclib._verdicts import is_solved
 
@@ -91,14 +92,14 @@ class SolverChoice:
     origin: str = ""
     label: str = ""  # its name in tables
     about: str = ""  # the description of the solver in JSON: `campaign.described`
-    # dimensions it takes, without rolling friction and with it; None: not known
-    dimensions: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+    # dimensions it takes, by the law of contact; None: not known
+    dimensions: Mapping[str, Sequence[int]] | None = None
 
     def suits(self, problem: ProblemFacts) -> bool:
         """Whether the solver takes problems of this kind, by what it declares."""
         if self.dimensions is None:
             return True
-        return problem.spacedim in self.dimensions[problem.kind.endswith("rolling")]
+        return problem.spacedim in self.dimensions[_laws.law_of(problem.kind)]
 
     @property
     def title(self) -> str:

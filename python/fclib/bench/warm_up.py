@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fclib import _core, _solve
+from fclib import _laws, _solve
 
 CONTACTS = 6
 LIMIT = 1.0  # [s] wall clock limit that the solver gets
@@ -21,18 +21,16 @@ LIMIT = 1.0  # [s] wall clock limit that the solver gets
 def small(kind: str, d: int) -> Any:
     """A small problem of a kind ("local", "global_rolling") and a number of components."""
     m = d * CONTACTS
-    friction: dict[str, Any] = {"mu": np.full(CONTACTS, 0.5)}
-    local, rolling = kind.startswith("local"), kind.endswith("rolling")
-    if rolling:
-        friction["mu_r"] = np.full(CONTACTS, 0.1)
+    friction = {
+        name: np.full(CONTACTS, 0.5 if name == "mu" else 0.1) for name in _laws.names(kind, d)
+    }
     # the matrix couples all contacts; some stick and some slide
     A = np.sin(np.arange(1.0, m * m + 1)).reshape(m, m)
     q = np.cos(np.arange(1.0, m + 1))
     q[::d] = -1.0
-    if local:
-        made: Any = _core.LocalRollingProblem if rolling else _core.LocalProblem
+    made: Any = _laws.CLASSES[kind]
+    if kind.startswith("local"):
         return made(spacedim=d, W=A @ A.T / m + 0.5 * np.eye(m), q=q, **friction)
-    made = _core.GlobalRollingProblem if rolling else _core.GlobalProblem
     return made(
         spacedim=d, M=np.eye(m), H=A / np.sqrt(m) + np.eye(m), f=np.zeros(m), w=q, **friction
     )

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib import _laws
 from fclib._judge import MARK, TOLERANCE, judge
 from fclib._solve import MERITS
 from fclib.cli._files import read_owner
@@ -57,7 +58,7 @@ def told_of(mismatch: dict[str, Any]) -> str:
 
 def consistent_of(problem: fclib.Problem) -> str:
     """The reason why other joints are judged than those of the file; empty if none are."""
-    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+    if isinstance(problem, _laws.Global):
         found = problem.consistent()
         return found[1] if found is not None else ""
     return ""

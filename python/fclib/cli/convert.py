@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 import fclib
-from fclib import _sequence
+from fclib import _laws, _sequence
 from fclib.cli._files import contents_of
 from fclib.cli._output import Json, Report, each_file, err, steps_of, usage_error
 
@@ -100,7 +100,7 @@ def read(path: Path, kind: str | None) -> Stored:
 
 def is_global(problem: fclib.Problem) -> bool:
     """Whether the problem has the dynamics of the bodies."""
-    return isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
+    return isinstance(problem, _laws.Global)
 
 
 def in_form(stored: Stored, form: Form | None) -> Stored:
@@ -110,13 +110,9 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
         fclib.UnsuitableError: M is singular, or bilateral constraints contradict each other.
     """
     problem = stored.problem
-    if form is not None and isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+    if form is not None and isinstance(problem, _laws.Global):
         problem = problem.condense()
-    if (
-        form is Form.plain
-        and problem.p
-        and isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
-    ):
+    if form is Form.plain and problem.p and isinstance(problem, _laws.Local):
         problem = problem.eliminate()
     if problem is stored.problem:
         return stored
@@ -133,7 +129,7 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
 
 def stored_as(problem: fclib.Problem, output: Format, asked: Storage | None) -> str:
     """The storage of a problem's matrices in a file: that of W, or of M."""
-    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
+    if isinstance(problem, _laws.Local):
         matrix = problem.W
     elif output is Format.hdf5:
         return Storage.triplet.value
@@ -266,8 +262,9 @@ def command(
     kind: Annotated[
         str | None,
         typer.Option(
-            help="local, global, local_rolling or global_rolling: which problem of a file that "
-            "holds several, or what a text holds if its sizes should not decide."
+            help="local, global, local_rolling, global_rolling, local_spin or global_spin: which "
+            "problem of a file that holds several, or what a text holds if its sizes should "
+            "not decide."
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there already.")] = False,

@@ -49,9 +49,10 @@ def domain_of(option: fclib.OptionInfo) -> str:
 
 
 def taken(solver: fclib.SolverInfo) -> str:
-    """The problems that a solver takes: "2D 3D rolling"."""
+    """The problems that a solver takes: "2D 3D rolling spin"."""
     plain = [f"{d}D" for d in solver.dimensions]
-    return " ".join([*plain, *(["rolling"] if solver.rolling_dimensions else [])])
+    laws = {"rolling": solver.rolling_dimensions, "spin": solver.spin_dimensions}
+    return " ".join([*plain, *(law for law, taken in laws.items() if taken)])
 
 
 def record_of(solver: fclib.SolverInfo) -> dict[str, Any]:
@@ -64,6 +65,7 @@ def record_of(solver: fclib.SolverInfo) -> dict[str, Any]:
         "citation": solver.citation,
         "dimensions": solver.dimensions,
         "rolling_dimensions": solver.rolling_dimensions,
+        "spin_dimensions": solver.spin_dimensions,
         "max_iterations": solver.max_iterations,
         "options": [describe(option) for option in solver.options],
     }
@@ -98,6 +100,7 @@ def show(solver: fclib.SolverInfo) -> None:
     rolling = {3: "planar", 5: "spatial"}
     takes = [f"{d}D" for d in solver.dimensions]
     takes += [f"{rolling[d]} rolling" for d in solver.rolling_dimensions]
+    takes += ["spin" if d == 4 else "spin and rolling" for d in solver.spin_dimensions]
     out.print(Text.assemble((solver.name, "bold"), f"  {solver.title}"))
     lines = {
         "family": solver.family,

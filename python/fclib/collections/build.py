@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fclib import _core, _digest, _solve, scenes
+from fclib import _core, _digest, _laws, _solve, scenes
 from fclib._judge import TOLERANCE, trivial
 from fclib._origin import origin_of
 from fclib.collections import catalog, ratings, references, trajectory
@@ -572,11 +572,11 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
 def facts_of(problem: Any) -> dict[str, Any]:
     """The columns of a row on a problem's data, whatever its origin."""
     mu = np.asarray(problem.mu)
-    rolls = problem.kind.endswith("rolling")
+    law = _laws.law_of(problem.kind)
     return {
         "title": problem.info.title,
         "formulation": problem.formulation,
-        "law": "rolling" if rolls else "Coulomb" if mu.any() else "none",
+        "law": law or ("Coulomb" if mu.any() else "none"),
         "spacedim": problem.spacedim,
         "n": problem.n,
         "p": problem.p,

@@ -40,7 +40,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("seed", "int64", "of the scene; null for an MJCF file"),
     ("title", "string", "of the problem"),
     ("formulation", "string", "of the global form, or the only one, in RT-0444's abbreviations"),
-    ("law", "string", "of friction: Coulomb, rolling, or none if mu is 0"),
+    ("law", "string", "of friction: Coulomb, rolling, spin, or none if mu is 0"),
     ("spacedim", "int32", "components of a contact"),
     ("n", "int32", "degrees of freedom of the bodies that contacts move; 0 for a local problem"),
     ("p", "int32", "bilateral constraints"),

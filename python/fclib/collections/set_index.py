@@ -42,6 +42,7 @@ SETS: dict[str, tuple[str, str]] = {
     "local": ("2", "problems of one contact"),
     "impacts": ("3", "bodies that strike and bounce, restitution 0 to 1"),
     "existence": ("3", "without a solution, or with several, and known to be so"),
+    "spin": ("1", "contacts that resist spin: grasping, turning, screws"),
     "dynamics": ("3", "silo, rope, spinning bodies, friction that differs by contact"),
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
     "machines": ("2", "gears, a hand, a rover on rubble, a net of rings, a shear box"),

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from fclib import _core, _registry
+from fclib import _core, _laws, _registry
 from fclib._registry import make_solver
 from fclib.external._words import RELAXATION
 
@@ -93,11 +93,7 @@ class Relaxation:
 
 def _friction(problem: Local) -> list[tuple[Array, slice]]:
     """The coefficients, each with the components of a contact that it bounds."""
-    d = problem.spacedim
-    if isinstance(problem, _core.LocalRollingProblem):
-        half = (d + 1) // 2
-        return [(problem.mu, slice(1, half)), (problem.mu_r, slice(half, d))]
-    return [(problem.mu, slice(1, d))]
+    return [(group.coefficient, group.part) for group in _laws.groups(problem)]
 
 
 def _program(P: Any, friction: list[tuple[Array, slice]], d: int) -> Program:

@@ -64,8 +64,8 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     Raises:
         ValueError: the problem has rolling friction, or the solution another size.
     """
-    if problem.kind.endswith("rolling"):
-        raise ValueError("the criteria are those of contacts that do not resist rolling")
+    if problem.kind not in ("local", "global"):
+        raise ValueError("the criteria are those of contacts that do not resist rolling or spin")
     r = np.asarray(solution.r, dtype=float)
     if len(r) != problem.m:
         raise ValueError(f"the reaction has {len(r)} numbers, and the problem has {problem.m}")

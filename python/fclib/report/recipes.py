@@ -57,7 +57,8 @@ def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
 def _kind(formulation: str) -> str:
     """The kind of a problem, which is the name of its group in a file."""
     whole = "global" if formulation.startswith("G") else "local"
-    return whole + ("_rolling" if "R" in formulation else "")
+    law = formulation.removeprefix("G")
+    return whole + ("_spin" if law.startswith("S") else "_rolling" if law.startswith("R") else "")
 
 
 def _c(formulation: str) -> str:

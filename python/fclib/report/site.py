@@ -68,7 +68,11 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("n", "dof", "degrees of freedom of the bodies that contacts move"),
     ("family", "family", "the scene that it is from"),
     ("kind", "kind", "the set that its family is of first: masonry, granular, mixed, ..."),
-    ("formulation", "form", "in the abbreviations of RT-0444: G global, M mixed, R rolling"),
+    (
+        "formulation",
+        "form",
+        "in the abbreviations of RT-0444: G global, M mixed, R rolling, S spin, E coupled",
+    ),
     ("application", "application", "what such problems are from"),
     ("solved_by", "solved by", "share of the solvers that take it and solve it, for its class"),
     ("spacedim", "d", "components of a contact"),
@@ -354,11 +358,13 @@ def rated_by(solved: int, voters: int) -> dict[str, Any]:
 
 def law_of(formulation: str) -> str:
     """The law of contact of a formulation (RT-0444's abbreviations), in words."""
-    found = re.fullmatch(r"G?(R?)(M?)([23])DFC", formulation)
+    found = re.fullmatch(r"G?(S?)(E?)(R?)(M?)([23])DFC", formulation)
     if found is None:
         return formulation
-    rolling, mixed, space = found.groups()
-    words = "Coulomb friction" + (" and rolling friction" if rolling else "")
+    spin, coupled, rolling, mixed, space = found.groups()
+    others = [name for name, there in (("spin", spin), ("rolling", rolling)) if there]
+    words = "Coulomb friction" + (f" and {' and '.join(others)} friction" if others else "")
+    words += ", coupled" if coupled else ""
     place = "in the plane" if space == "2" else "in space"
     return f"{words} {place}{', with joints' if mixed else ''} ({formulation})"
 
@@ -724,6 +730,7 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
         return found
     found["papers"] = citing.papers_of(about["citation"])
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
+    found["spin"] = about.get("spin", [])  # stores of earlier versions have none
     return found | {"known": about["options"]}
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
-from fclib import _core
+from fclib import _core, _laws
 from fclib.report.libraries import libraries
 from fclib.report.network import Network, network_of
 from fclib.report.solids import record_of, solids_of
@@ -146,16 +146,14 @@ def hulls_of(network: Network) -> list[list[int]]:
 def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
     d, nc = problem.spacedim, problem.nc
     r = np.asarray(solution.r).reshape(nc, d)
-    # the first components are those of a force, also with rolling friction
-    tangential = 1 if d == 2 or (d == 3 and hasattr(problem, "mu_r")) else 2
-    force = r[:, : 1 + tangential]
+    force = r[:, : _laws.of_force(problem.kind, d)]
     each = _core.contact_merits(problem, solution)
     found: dict[str, Any] = {
         "reactions": rounded(force),
         "status": "".join(str(STATUS.index(name)) for name in each["status"]),
     }
     if network.frames is not None:
-        inside = network.frames[:, :, : 1 + tangential]
+        inside = network.frames[:, :, : force.shape[1]]
         found["forces"] = rounded(np.einsum("kij,kj->ki", inside, force))
     merit = _core.merit(problem, solution)
     figures = {name: getattr(merit, name) for name in dir(merit) if not name.startswith("_")}

@@ -41,6 +41,8 @@ A bilateral constraint with violation c is corrected by the same share: b = stab
 
 With rolling friction a contact has five components, N, T1, T2, R1, R2: the last two are the
 relative angular velocity about T1 and T2 [rad/s], and the rolling moment, ||r_R|| <= mu_r r_N.
+With spin friction it has four, N, T1, T2, S, or six if it resists rolling too: S is the relative
+angular velocity about N, and its moment. With four, sliding and spin share one limit, an ellipsoid.
 
 Dry friction in a joint, a force of at most F against its velocity s^T v, is also a contact
 (docs/mathematics.md): an auxiliary degree of freedom z of mass a, pressed by F, is its normal
@@ -82,7 +84,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from fclib import _core, _solve
+from fclib import _core, _geometry, _laws, _solve
 from fclib.scenes import Law
 from fclib.scenes.shared.interaction import Interaction
 from fclib.simulate.arrays import (
@@ -120,6 +122,7 @@ class Contacts:
     mu_r: Vector | None = None  # (nc) coefficient of rolling friction [m]; None: no rolling
     planar: bool = False  # d = 2, 3 with rolling
     interaction: npt.NDArray[np.int64] | None = None  # (nc) its number in the scene; None: no such
+    mu_s: Vector | None = None  # (nc) coefficient of spin friction [m]; None: no spin
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -134,18 +137,23 @@ class Contacts:
             None if self.mu_r is None else self.mu_r.take(which),
             self.planar,
             None if self.interaction is None else self.interaction.take(which),
+            None if self.mu_s is None else self.mu_s.take(which),
         )
 
     @property
     def dimension(self) -> int:
-        """Components d of a contact: 3, or 2 in the plane; with rolling friction 5, or 3."""
-        return components(self.planar, rolling=self.mu_r is not None)
+        """Components d of a contact: 3, or 2 in the plane; with rolling friction 5, or 3.
+
+        With spin friction 4, or 6 with both.
+        """
+        rolling, spin = self.mu_r is not None, self.mu_s is not None
+        return components(self.planar, rolling=rolling, spin=spin)
 
     @property
     def parts(self) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
         """The components of a contact for force and moment, and their rows of the frame."""
         force, d = 2 if self.planar else 3, self.dimension
-        axis = 2 if self.planar else 1
+        axis = _geometry.first_axis(self.planar, d)
         return (
             (slice(0, force), slice(0, force)),
             (slice(force, d), slice(axis, axis + d - force)),
@@ -159,11 +167,11 @@ class Contacts:
         return world
 
 
-def components(planar: bool, *, rolling: bool) -> int:
+def components(planar: bool, *, rolling: bool, spin: bool = False) -> int:
     """Number d of components of a contact."""
     if planar:
         return 3 if rolling else 2
-    return 5 if rolling else 3
+    return 3 + (2 if rolling else 0) + (1 if spin else 0)
 
 
 @dataclass(frozen=True)
@@ -398,8 +406,14 @@ class MoreauJean:
             "spacedim": d,
             "info": info or _core.ProblemInfo(),
         }
-        problem: _core.GlobalProblem | _core.GlobalRollingProblem
-        if contacts.mu_r is None:
+        problem: _laws.Global
+        if contacts.mu_s is not None:
+            # sliding and spin share their limit; with rolling each has its own
+            coupled = int(contacts.mu_r is None)
+            problem = _core.GlobalSpinProblem(
+                **fields, mu_s=contacts.mu_s, mu_r=contacts.mu_r, coupled=coupled
+            )
+        elif contacts.mu_r is None:
             problem = _core.GlobalProblem(**fields)
         else:
             problem = _core.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
@@ -438,7 +452,7 @@ class MoreauJean:
 class StepProblem:
     """The problem of one step, and the part that it leaves out."""
 
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem
+    problem: _laws.Global
     contacts: Contacts  # nc, the active ones
     # (n') degrees of freedom of the system that the problem has; its auxiliary ones follow
     dofs: npt.NDArray[np.int64]
@@ -495,6 +509,7 @@ def with_dry_friction(
             np.concatenate((contacts.mu, own.mu)),
             None if contacts.mu_r is None else np.concatenate((contacts.mu_r, np.zeros(k))),
             contacts.planar,
+            mu_s=None if contacts.mu_s is None else np.concatenate((contacts.mu_s, np.zeros(k))),
         ),
         np.concatenate((tree, tree.take(dry.first))),
     )

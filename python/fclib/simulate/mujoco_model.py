@@ -7,7 +7,8 @@ velocity of the second relative to the first. A row of an equality is the rate o
 
 A limit of a joint or a tendon is a contact without friction: its row is N, its tangents are zero,
 and its pair is (-1 - kind, index); the same holds for dry friction. Contacts of condim 6 make
-rolling problems. FCLIB's law has no spin friction, so theirs is left out.
+rolling problems. If a coefficient of torsion is not 0, they are problems of spin, with or without
+rolling.
 
 The configuration is q, then the states of actuators, which MuJoCo's own rates advance, then other
 values on which forces depend: the time if the scene has a gait (`mujoco_scene.py`), or else the
@@ -57,6 +58,7 @@ from fclib.simulate.mujoco_scene import (
     periodic_cell,
     refuse_out_of_plane,
     refuse_unknown,
+    spins,
 )
 from fclib.simulate.plane import in_plane
 from fclib.simulate.rounding import exponent_of
@@ -125,6 +127,8 @@ class MujocoModel:
         self._dry: DryFriction | None = None
         self._rubbing_tendons = bool(m.tendon_frictionloss.any())
         self.rolling = has_condim(m, 6)
+        # nothing spins in the plane
+        self.spin = spins(m) and not scene.planar and "torsion" not in scene.ignore
         # make every detected contact give rows
         m.geom_gap[:] = 0
         m.pair_gap[:] = 0
@@ -591,7 +595,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     dim = contact.dim.take(which)
     friction = contact.friction.take(which, axis=0)
     friction *= friction > LEAST_MU
-    # sliding has two coefficients, rolling two more
+    # sliding has two coefficients, spin one, and rolling two
     for one, other in ((0, 1), (3, 4)) if source.rolling else ((0, 1),):
         differs = friction[:, one] != friction[:, other]
         if differs.any():
@@ -600,14 +604,17 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
 
     limits = slice(data.ne + data.nf, data.ne + data.nf + data.nl)
     touching, nc = len(which), len(which) + data.nl
-    d = components(planar=False, rolling=source.rolling)
+    d = components(planar=False, rolling=source.rolling, spin=source.spin)
     # -1 if a component has no row
     source_row = np.full((nc, d), -1)
     source_row[:touching, :3] = address[:, None] + np.arange(3)
+    # MuJoCo's rows are N, T1, T2, spin, R1, R2
+    if source.spin:
+        turning = np.flatnonzero(dim >= 4)
+        source_row[turning, 3] = address[turning] + 3
     if source.rolling:
-        # N, T1, T2, spin, R1, R2
         rolls = np.flatnonzero(dim == 6)
-        source_row[rolls, 3:] = address[rolls][:, None] + (4, 5)
+        source_row[rolls, -2:] = address[rolls][:, None] + (4, 5)
     source_row[touching:, 0] = np.arange(limits.start, limits.stop)
     H = submatrix(rows, source_row.ravel())
 
@@ -626,6 +633,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
         gap=with_limits(contact.dist.take(which)),
         mu=with_limits(friction[:, 0].copy()),
         mu_r=with_limits(np.where(dim == 6, friction[:, 3], 0.0)) if source.rolling else None,
+        mu_s=with_limits(np.where(dim >= 4, friction[:, 2], 0.0)) if source.spin else None,
     )
     contacts.pair[touching:, 0] = -1 - data.efc_type[limits]
     contacts.pair[touching:, 1] = data.efc_id[limits]

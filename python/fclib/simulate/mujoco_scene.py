@@ -35,7 +35,7 @@ DYNAMICS: Final = tuple(
 IGNORABLE: Final = {
     "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
     "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
-    "torsion": None,  # spin friction of condim 4: taken as condim 3
+    "torsion": None,  # spin friction of condim 4 and 6: taken as condim 3, and as rolling alone
     "anisotropy": None,  # two coefficients: their geometric mean
     "activation": None,  # actuators with a state: it stays as it is at the start
 }
@@ -236,14 +236,18 @@ def has_condim(m: Any, condim: int) -> bool:
     return bool(condim in m.geom_condim[collides] or condim in m.pair_dim)
 
 
+def spins(m: Any) -> bool:
+    """Whether a contact of the model may resist spin."""
+    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+    of_shapes = (m.geom_condim >= 4) & collides & (m.geom_friction[:, 1] > 0)
+    of_pairs = (m.pair_dim >= 4) & (m.pair_friction[:, 2] > 0)
+    return bool(of_shapes.any() or of_pairs.any())
+
+
 def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     """The unsupported features of a scene, one line each, without those it ignores on purpose."""
     lost = []
     collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-    spins = (m.geom_condim >= 4) & collides & (m.geom_friction[:, 1] > 0)
-    of_pairs = (m.pair_dim >= 4) & (m.pair_friction[:, 2] > 0)
-    if (spins.any() or of_pairs.any()) and "torsion" not in scene.ignore:
-        lost.append("torsional friction (condim 4 and 6)")
     differs = (m.pair_dim > 1) & (m.pair_friction[:, 0] != m.pair_friction[:, 1])
     differs |= (m.pair_dim == 6) & (m.pair_friction[:, 3] != m.pair_friction[:, 4])
     if differs.any() and "anisotropy" not in scene.ignore:

@@ -27,7 +27,7 @@ def in_plane(H: Sparse, contacts: Contacts, sizes: Vector) -> tuple[Sparse, Cont
     """The contacts and their columns in the plane.
 
     Args:
-        H: (n x 3 nc), with rolling friction (n x 5 nc).
+        H: (n x 3 nc), with rolling friction (n x 5 nc); nothing spins in the plane.
         contacts: nc, in space.
         sizes: (nc) of the larger body of each contact [m].
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from fclib import _core, _geometry, _solve
+from fclib import _core, _geometry, _laws, _solve
 from fclib._origin import origin_of
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
@@ -78,7 +78,7 @@ class Step:
 
     index: int  # 0, 1, ...
     time: float  # at the start of the step [s]
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem  # nc is 0 if nothing touches
+    problem: _laws.Global  # nc is 0 if nothing touches
     result: _core.Result  # its status tells whether the solver reached the tolerance
     velocity: Vector  # v (n) of the whole system after the step
     # (n') the degrees of freedom in the problem: those that contacts move
@@ -206,7 +206,8 @@ def _march(
         np.zeros((0, 3, 3)),
         np.zeros((0, 3)),
     )
-    info_of = descriptions(model.scene, scheme, settings, model.left_out)
+    spin = bool(getattr(model, "spin", False))
+    info_of = descriptions(model.scene, scheme, settings, model.left_out, spin=spin)
     for index in range(state.index, state.index + steps):
         if control is not None:
             assert isinstance(model, MujocoModel)
@@ -264,9 +265,7 @@ def _march(
             )
 
 
-def nearest(
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem, solution: _core.Solution, r: Vector
-) -> Vector | None:
+def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vector | None:
     """The reactions nearest to r (m) of bodies at rest, without the cones; None: bodies move.
 
     Reactions of sticking contacts may change by any dr that moves nothing, H dr = 0. A solver
@@ -302,7 +301,7 @@ def largest(values: Vector) -> float:
 
 
 def trouble(
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem,
+    problem: _laws.Global,
     result: _core.Result,
     velocity: Vector,
     bound: float,
@@ -400,7 +399,12 @@ def same_contacts(
 
 
 def descriptions(
-    scene: Scene, scheme: MoreauJean, settings: dict[str, Any], left_out: Sequence[str] = ()
+    scene: Scene,
+    scheme: MoreauJean,
+    settings: dict[str, Any],
+    left_out: Sequence[str] = (),
+    *,
+    spin: bool = False,
 ) -> Callable[..., _core.ProblemInfo]:
     """The function that gives the info of each step, from its number and its own settings.
 
@@ -451,6 +455,7 @@ def descriptions(
     words_of_components = (
         "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
     )
+    of_spin = "; S of spin before R, r_S in N m s, mu_s in m" if spin else ""
     title = f"{scene.title or scene.name}, step "
     # the JSON of each step is that of one dictionary, in this order
     before = "\n".join([*words, json.dumps(origin, default=str)]).lstrip()[:-1]
@@ -461,7 +466,7 @@ def descriptions(
         " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
         f"{GYROSCOPIC if scene.gyroscopic else ''}"
         f" v in m/s and rad/s, r in N s, components {words_of_components},"
-        " r_R in N m s, mu_r in m)"
+        f" r_R in N m s, mu_r in m{of_spin})"
     )
 
     def of_step(index: int, **own: Any) -> _core.ProblemInfo:

@@ -4,7 +4,9 @@
 #include <limits>
 
 #include "contact/coulomb.hpp"
+#include "contact/ellipsoid.hpp"
 #include "contact/rolling.hpp"
+#include "contact/spin.hpp"
 #include "error_size.hpp"
 #include "linalg/double_double.hpp"
 #include "merit/merit.hpp"
@@ -25,6 +27,19 @@ Rolling<D> narrow(const Rolling<D, Wide>& cone) {
                     static_cast<double>(cone.coefficient(1)));
 }
 
+template <int D>
+Spin<D> narrow(const Spin<D, Wide>& cone) {
+  typename Spin<D>::Coefficients coefficients;
+  for (int g = 0; g < Spin<D>::groups; ++g) {
+    coefficients[g] = static_cast<double>(cone.coefficient(g));
+  }
+  return Spin<D>(coefficients);
+}
+Ellipsoid<> narrow(const Ellipsoid<Wide>& cone) {
+  return Ellipsoid<>(static_cast<double>(cone.coefficient(0)),
+                     static_cast<double>(cone.coefficient(1)));
+}
+
 /// r - P_K(r - rho u^), as it stands.
 template <class Cone>
 typename Cone::Vec by_definition(const Cone& cone, const typename Cone::Vec& u,
@@ -38,20 +53,19 @@ typename Cone::Vec by_definition(const Cone& cone, const typename Cone::Vec& u,
 template <class Cone>
 void draw(const Cone& cone, int kind, testing::RandomData& random, ContactVector<Cone::dim>& u,
           ContactVector<Cone::dim>& r) {
-  constexpr int S = Cone::group_size;
   u = random.vector(Cone::dim);
   r = random.vector(Cone::dim);
   if (kind == 0) return;
   u[0] = kind == 1 ? std::abs(u[0]) : 0.0;
   r[0] = kind <= 2 ? 0.0 : std::abs(r[0]);
-  for (int g = 0; g < Cone::groups; ++g) {
-    auto slip = u.template segment<S>(1 + S * g);
-    auto force = r.template segment<S>(1 + S * g);
+  for_each_group<Cone>([&](auto g) {
+    auto slip = u.template segment<Cone::size(g)>(Cone::start(g));
+    auto force = r.template segment<Cone::size(g)>(Cone::start(g));
     const auto limit = static_cast<double>(cone.coefficient(g)) * r[0];
     if (kind == 3 || random.vector(1)[0] > 0.3) slip.setZero();
     force *= (kind == 3 ? 0.5 : 1.0) * limit / force.norm();
     if (kind == 4 && slip.norm() > 0) force = -limit / slip.norm() * slip;
-  }
+  });
 }
 
 template <class Cone>
@@ -84,6 +98,10 @@ TEST(NaturalMap, is_that_of_the_definition_for_any_friction) {
     for (const double mu_r : coefficients) {
       expect_the_definition(Rolling<3, Wide>(mu, mu_r), random);
       expect_the_definition(Rolling<5, Wide>(mu, mu_r), random);
+      expect_the_definition(Spin<4, Wide>({mu, mu_r}), random);
+      expect_the_definition(Spin<6, Wide>({mu, mu_r, 0.3}), random);
+      expect_the_definition(Spin<6, Wide>({0.3, mu, mu_r}), random);
+      expect_the_definition(Ellipsoid<Wide>(mu, mu_r), random);
     }
   }
 }

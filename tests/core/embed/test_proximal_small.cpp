@@ -24,6 +24,7 @@ using proximal_small::FewCoordinates;
 using proximal_small::Law;
 using proximal_small::Serial;
 using proximal_small::Solver;
+using testing::InStep;
 using testing::Team;
 
 constexpr int most_contacts = 6;
@@ -65,7 +66,8 @@ struct Planted {
     inverse = random.vector(coordinates).array().exp();
     W = J * inverse.asDiagonal() * J.transpose();
     if (skew > 0) {
-      const Eigen::MatrixXd x = Eigen::MatrixXd::NullaryExpr(m, m, [&] { return random.vector(1)[0]; });
+      const Eigen::MatrixXd x =
+          Eigen::MatrixXd::NullaryExpr(m, m, [&] { return random.vector(1)[0]; });
       W += Eigen::MatrixXd::Identity(m, m) + skew * (x - x.transpose());
     }
     Vector u = Vector::Zero(m), r = Vector::Zero(m);
@@ -145,7 +147,8 @@ struct AsBlocks {
   static int room() { return System::room(most_contacts, false); }
   static void place(System& system, double* at) { system.place(at, most_contacts, false); }
   explicit AsBlocks(const Planted<Law>& problem) {
-    given = {problem.blocks.data(), problem.q.data(), problem.starts.data(), problem.columns.data()};
+    given = {problem.blocks.data(), problem.q.data(), problem.starts.data(),
+             problem.columns.data()};
   }
   typename System::Given given;
 };
@@ -215,7 +218,8 @@ void expect_true_words(double least_share, double skew = 0) {
   EXPECT_GE(solved, least_share * planted_count());
 }
 
-/// A share of the problems that stalls is left to `auto`: those with mu = 4, or without rolling mass.
+/// A share of the problems that stalls is left to `auto`: those with mu = 4, or without rolling
+/// mass.
 TEST(ProximalSmall, SaysOnlyWhatTheMeritSays) {
   expect_true_words<AsMatrix, Law<2>>(0.95);
   expect_true_words<AsMatrix, Law<3>>(0.95);
@@ -304,6 +308,48 @@ TEST(ProximalSmall, ATeamOfLanesFindsWhatOneFinds) {
   expect_team_agrees<AsBodies, 4>(3, 2);
   expect_team_agrees<AsBodies, 32>(4, 1);
   expect_team_agrees<AsFew, 4>(3, 2);
+}
+
+/// Groups of a warp have problems of different numbers of contacts, and one has none at all.
+template <template <class, class> class As>
+void expect_groups_stay_in_step(int first) {
+  constexpr int lanes = 2, groups = 3;
+  using Group = InStep<lanes, groups>;
+  using Form = As<Law<3>, Group>;
+  using Problem = Planted<Law<3>>;
+  const std::vector<Problem> problems{Problem(first), Problem(first + 3)};
+  std::vector<Vector> r, u;
+  for (const Problem& problem : problems) {
+    r.emplace_back(Vector::Zero(problem.q.size()));
+    u.emplace_back(Vector::Zero(problem.q.size()));
+  }
+  std::vector<std::vector<double>> memory(groups, std::vector<double>(Form::room()));
+  std::array<Answer, lanes * groups> answers;
+  Group::run([&](const Group& group, int own) {
+    const bool busy = own < 2;
+    const Problem& problem = problems[busy ? own : 0];
+    const Form form(problem);
+    const auto solver = std::make_unique<Solver<typename Form::System, most_contacts / lanes>>();
+    solver->system.group = group;
+    Form::place(solver->system, memory[own].data());
+    const double* limits[1] = {problem.limits[0].data()};
+    const int to = busy ? own : 0;
+    solver->begin(busy, busy ? problem.nc : 0, form.given, limits, problem.guess.data(),
+                  {r[to].data(), u[to].data()});
+    while (group.anyone(busy && !solver->finished())) solver->advance(busy && !solver->finished());
+    answers[group.number] = solver->answer();
+  });
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(answers[lanes * k].ending, Ending::converged);
+    EXPECT_LE(problems[k].judged(r[k]), 1.001 * tolerance);
+  }
+}
+
+TEST(ProximalSmall, GroupsOfAWarpStayInStep) {
+  expect_groups_stay_in_step<AsMatrix>(2);
+  expect_groups_stay_in_step<AsBlocks>(2);
+  expect_groups_stay_in_step<AsBodies>(2);
+  expect_groups_stay_in_step<AsFew>(2);
 }
 
 }  // namespace

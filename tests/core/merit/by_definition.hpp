@@ -38,8 +38,8 @@ typename Cone::Vec modified_velocity(const Cone& cone, const typename Cone::Vec&
   typename Cone::Vec result = u;
   for (int group = 0; group < Cone::groups; ++group) {
     double squares = 0;
-    for (int k = 0; k < Cone::group_size; ++k) {
-      squares += std::pow(u[1 + group * Cone::group_size + k], 2);
+    for (int k = 0; k < Cone::size(group); ++k) {
+      squares += std::pow(u[Cone::start(group) + k], 2);
     }
     result[0] += cone.coefficient(group) * std::sqrt(squares);
   }

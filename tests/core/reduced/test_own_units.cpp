@@ -7,7 +7,7 @@
 #include "fused_kernels.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/interior_point.hpp"
-#include "methods/rolling_interior_point.hpp"
+#include "methods/product_interior_point.hpp"
 #include "random_data.hpp"
 
 namespace fclib {
@@ -23,7 +23,7 @@ Vector other_units() {
   for (Index a = 0; a < contacts; ++a) {
     auto own = s.template segment<Cone::dim>(Cone::dim * a);
     own.setConstant(std::exp2(std::round(random.uniform(-12, 12))));
-    if (Cone::groups == 2) own.template tail<Cone::group_size>() *= std::exp2(a % 9 - 4);
+    for (int k = Cone::lengths; k < Cone::dim; ++k) own[k] *= std::exp2(a % 9 - 4);
   }
   return s;
 }
@@ -42,10 +42,10 @@ ReducedProblem random_problem(const Vector& s) {
   problem.q = problem.q.cwiseProduct(s);
   problem.friction.mu = Vector::Constant(contacts, 0.6);
   problem.friction.mu[0] = 0;
-  if (Cone::groups == 2) {
-    problem.friction.mu_r = Vector::Constant(contacts, 0.2);
-    for (Index a = 0; a < contacts; ++a) problem.friction.mu_r[a] *= s[D * a] / s[D * a + D - 1];
-  }
+  Vector length = Vector::Constant(contacts, 0.2);
+  for (Index a = 0; a < contacts; ++a) length[a] *= s[D * a] / s[D * a + D - 1];
+  if (D % 2 == 0 && Cone::groups > 1) problem.friction.mu_s = length;
+  if (Cone::groups > 1 && D != 4) problem.friction.mu_r = length;
   problem.scale = problem.q.norm();
   return problem;
 }
@@ -84,13 +84,16 @@ void expect_same_way(const Rules& rules) {
 TEST(OwnUnits, interior_points_go_the_same_way_in_all_units) {
   expect_same_way<Coulomb<2>, InteriorPoint<2>>(InteriorPointRules{});
   expect_same_way<Coulomb<3>, InteriorPoint<3>>(InteriorPointRules{.smoothing = 0.3});
-  expect_same_way<Rolling<3>, RollingInteriorPoint<3>>(InteriorPointRules{});
-  expect_same_way<Rolling<5>, RollingInteriorPoint<5>>(InteriorPointRules{});
+  expect_same_way<Rolling<3>, ProductInteriorPoint<Rolling<3>>>(InteriorPointRules{});
+  expect_same_way<Rolling<5>, ProductInteriorPoint<Rolling<5>>>(InteriorPointRules{});
+  expect_same_way<Spin<4>, ProductInteriorPoint<Spin<4>>>(InteriorPointRules{});
+  expect_same_way<Spin<6>, ProductInteriorPoint<Spin<6>>>(InteriorPointRules{});
 }
 
 TEST(OwnUnits, the_homotopy_goes_the_same_way_in_all_units) {
   expect_same_way<Coulomb<3>, Homotopy<Coulomb<3>>>(HomotopyRules{});
   expect_same_way<Rolling<5>, Homotopy<Rolling<5>>>(HomotopyRules{});
+  expect_same_way<Spin<6>, Homotopy<Spin<6>>>(HomotopyRules{});
 }
 
 TEST(OwnUnits, there_and_back) {

@@ -168,7 +168,8 @@ Fclib.count = (number, one, many = `${one}s`) => `${number} ${number === 1 ? one
 
 /* different problems; those with the data of another one are told apart */
 Fclib.problems = ({ problems, copies }) =>
-  Fclib.count(problems, "problem") + (copies ? ` and ${Fclib.count(copies, "copy", "copies")}` : "");
+  Fclib.count(problems, "problem") +
+  (copies ? ` and ${Fclib.count(copies, "copy", "copies")}` : "");
 
 // ---- light and dark: the system's choice until a person makes another
 Fclib.theme = {

@@ -49,6 +49,7 @@
             [
               ...solver.dimensions.map((d) => `${d}D`),
               ...(solver.rolling || []).map((d) => `${d === 3 ? "planar" : "spatial"} rolling`),
+              ...(solver.spin || []).map((d) => (d === 4 ? "spin" : "spin and rolling")),
             ].join(", "),
         ],
       ]),

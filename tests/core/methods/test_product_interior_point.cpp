@@ -1,4 +1,4 @@
-#include "methods/rolling_interior_point.hpp"
+#include "methods/product_interior_point.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,10 @@ namespace fclib {
 namespace {
 
 /// Contacts on enough coordinates that the reactions are unique, all of which approach; the first
-/// ones without friction of one kind or the other, or of both.
-template <int D>
+/// ones without friction of one kind or the other, or of all.
+template <class Cone>
 ReducedProblem random_problem(std::uint64_t seed, Index nc) {
+  constexpr int D = Cone::dim;
   testing::RandomData random(seed);
   const Eigen::Index m = Eigen::Index{D} * nc;
   const Eigen::MatrixXd H = random.dense(2 * m, m);
@@ -21,20 +22,22 @@ ReducedProblem random_problem(std::uint64_t seed, Index nc) {
       .friction = {}};
   for (Index a = 0; a < nc; ++a) problem.q[D * a] = -1;
   problem.friction.mu = Vector::Constant(nc, 1.0);
-  problem.friction.mu_r = Vector::Constant(nc, 0.5);
+  Vector other = Vector::Constant(nc, 0.5);
   problem.friction.mu[0] = problem.friction.mu[1] = 0;
-  problem.friction.mu_r[1] = problem.friction.mu_r[2] = 0;
+  other[1] = other[2] = 0;
+  if (D % 2 == 0) problem.friction.mu_s = other;
+  if (D != 4) problem.friction.mu_r = other;
   problem.scale = problem.q.norm();
   return problem;
 }
 
-template <int D>
-void expect_solved() {
-  constexpr double tolerance = 2e-6;  // the last digits are left to the proximal point
+/// The last digits are left to the proximal point.
+template <class Cone>
+void expect_solved(double tolerance) {
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
-    const ReducedProblem problem = random_problem<D>(seed, 20);
+    const ReducedProblem problem = random_problem<Cone>(seed, 20);
     CoupledSystem system(problem);
-    RollingInteriorPoint<D> method(problem, system);
+    ProductInteriorPoint<Cone> method(problem, system);
     Vector r;
     int iterations = 0;
     method.solve({}, Vector::Zero(problem.m()), [&](double error, const Vector& at) {
@@ -44,14 +47,19 @@ void expect_solved() {
     });
     Vector u;
     problem.velocity(r, u);
-    EXPECT_LE(relative_error<Rolling<D>>(problem, u, r), tolerance) << seed;
+    EXPECT_LE(relative_error<Cone>(problem, u, r), tolerance) << seed;
     EXPECT_LT(iterations, 20) << seed;  // with a wrong Jacobian there are more
   }
 }
 
-TEST(RollingInteriorPoint, solves_in_the_plane_and_in_space) {
-  expect_solved<3>();
-  expect_solved<5>();
+TEST(ProductInteriorPoint, solves_rolling_in_the_plane_and_in_space) {
+  expect_solved<Rolling<3>>(2e-6);
+  expect_solved<Rolling<5>>(2e-6);
+}
+
+TEST(ProductInteriorPoint, solves_spin_with_and_without_rolling) {
+  expect_solved<Spin<4>>(1e-5);
+  expect_solved<Spin<6>>(1e-5);
 }
 
 }  // namespace

@@ -195,7 +195,7 @@ def _undone(whole: _Whole, u: Numbers, r: Numbers) -> float:
     if not whole.plain:
         return 0.0
     local: Any = whole.problem
-    bodies = isinstance(local, (_core.GlobalProblem, _core.GlobalRollingProblem))
+    bodies = isinstance(local, _laws.Global)
     if bodies:
         local = local.condense()
     m, p, d = local.m, local.p, local.spacedim

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import fclib
+from fclib import _stored
+from fclib.collections import set_index
 from fclib.scenes import assemblies, granular_flow
 from fclib.scenes.granular_flow import DIAMETER, MU, SIZES, STATES, GranularFlow, bodies_of, stored
 from fclib.scenes.shared import assembly
@@ -28,9 +30,13 @@ def test_bytes_of_integers_are_those_integers() -> None:
 
 
 def test_file_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(granular_flow, "IN_PLACE", tmp_path)
+    monkeypatch.setattr(granular_flow, "IN_PLACE", tmp_path / "none")
+    monkeypatch.setattr(_stored, "COLLECTION", "fclib_collection_that_is_missing")
     with pytest.raises(FileNotFoundError, match="pip install fclib-collection"):
         granular_flow.path()
+    # what lists families goes on without the package
+    assert GranularFlow.digests() == ()
+    assert set_index.distinct_of(["flows/GranularFlow"]) is None
 
 
 @pytest.mark.parametrize("size", range(len(SIZES)))

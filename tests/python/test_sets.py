@@ -301,6 +301,7 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "simulators",
         "decks",
         "rr9118",
+        "fclib2024",
         "quasistatic",
         "laws",
         "assembly",

@@ -467,6 +467,7 @@ NOT_MET = {
     "rr9118/Chain": ("contacts",),
     "rr9118/KaplasTower": ("density",),
     "rr9118/PeriodicBox": ("contacts",),
+    "fclib2024/SpheresPile": ("contacts",),
 }
 # families of the published sets whose problems have no state: they are assembled, or of one contact
 NOT_SIMULATED = {
@@ -601,8 +602,9 @@ def deepest(name: str, states: Any) -> float:
 
 @there
 def test_the_published_sizes_are_those_of_sets_with_states() -> None:
-    assert {folder for folder in SIZES if PRESENT[folder] in STORED} >= set(NOT_MET)
-    assert sum(PRESENT[folder] in STORED for folder in SIZES) >= 12
+    there = {folder for folder in SIZES if PRESENT.get(folder) in STORED}
+    assert there >= set(NOT_MET)
+    assert len(there) >= 15
 
 
 @there

@@ -80,8 +80,12 @@ class GranularFlow:
 
     @classmethod
     def digests(cls) -> tuple[str, ...]:
-        """The digests of the problems as they were stored."""
-        with np.load(path()) as arrays:
+        """The digests of the problems as they were stored; none if the states are not here."""
+        try:
+            stored_file = path()
+        except FileNotFoundError:
+            return ()
+        with np.load(stored_file) as arrays:
             return tuple(json.loads(str(arrays["digests"])))
 
 
@@ -166,14 +170,14 @@ def stored(size: int) -> tuple[State, ...]:
     """The states of a size, in time."""
     with np.load(path()) as arrays:
         head = arrays[f"head{size}"].tolist()  # width and time step, in d and sqrt(d / g)
-        radii: Vector = whole(arrays[f"radii{size}"]).T[:, 0] * (RADIUS * 0.5 * DIAMETER)
+        radii = np.multiply(whole(arrays[f"radii{size}"])[0], RADIUS * 0.5 * DIAMETER)
         speed = math.sqrt(assembly.GRAVITY * DIAMETER)
         unit = math.sqrt(DIAMETER / assembly.GRAVITY)  # of time
         units = (PLACE * DIAMETER, VELOCITY * speed, SPIN / unit)
         states = []
         for k, time in enumerate(arrays[f"time{size}"].tolist()):
             three: list[Vector] = [
-                whole(arrays[f"{name}{size}_{k}"]).T * one
+                np.multiply(whole(arrays[f"{name}{size}_{k}"]).T, one)
                 for name, one in zip(("place", "velocity", "spin"), units, strict=True)
             ]
             states.append(State(time * unit, head[1] * unit, head[0] * DIAMETER, radii, *three))

@@ -12,6 +12,7 @@ from pathlib import Path
 from fclib import _core
 from fclib._solve import Problem
 
+SUFFIXES = (".h5", ".hdf5")  # of a name that is that of a file, and not of a folder
 STEP = re.compile(r"(.+)#([0-9]+)", re.DOTALL)
 
 
@@ -24,13 +25,13 @@ def place_of(path: str | os.PathLike[str]) -> tuple[Path, int | None]:
 
 
 def expanded(path: Path) -> list[Path]:
-    """The steps of a sequence; of another file, the path itself.
+    """The steps of a sequence; of another file, or of a sequence without a step, the path itself.
 
     Raises:
         fclib.FileError: the file cannot be read.
     """
     found = _core.steps(path) if path.is_file() else None
-    if found is None:
+    if not found:
         return [path]
     return [Path(_core.step_path(path, k)) for k in range(len(found))]
 

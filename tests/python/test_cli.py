@@ -3,6 +3,8 @@
 import io
 import json
 import os
+import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -505,6 +507,48 @@ def test_an_error_of_the_system_is_said_without_its_number(tmp_path: Path) -> No
     missing = tmp_path / "none.xml"
     expected = f"fclib: {missing}: No such file or directory\n"
     assert run("simulate", missing, "--out", tmp_path / "out").stderr == expected
+
+
+@pytest.fixture
+def half_a_minute() -> Iterator[None]:
+    def end(*_: object) -> None:
+        raise TimeoutError("the command does not end")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(30)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("simulate", "PIPE"),
+        ("simulate", "/dev/full"),
+        ("simulate", "SCENE", "--ctrl", "PIPE"),
+        ("simulate", "SCENE", "--states", "PIPE"),
+        ("bench", "PIPE"),
+        ("check", "PROBLEM", "--certificate", "PIPE"),
+        ("solve", "PROBLEM", "--option", "law=@PIPE"),
+        ("info", "PIPE"),
+        ("convert", "PIPE", "new.hdf5"),
+        ("record", "mujoco", "PIPE"),
+    ],
+)
+def test_what_may_have_no_end_is_no_file(
+    words: tuple[str, ...], tmp_path: Path, files: list[Path], half_a_minute: None
+) -> None:
+    pipe, scene = tmp_path / "pipe.csv", tmp_path / "scene.xml"
+    os.mkfifo(pipe)
+    scene.write_text(
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'><freejoint/>"
+        "<geom size='.1'/></body></worldbody></mujoco>"
+    )
+    names = {"PIPE": pipe, "SCENE": scene, "PROBLEM": files[0]}
+    done = run(*(re.sub("[A-Z]{4,}", lambda name: str(names[name[0]]), word) for word in words))
+    assert done.returncode in (1, 2), done.stdout
+    assert re.search("no(t a)? regular file|there is no such script", " ".join(done.stderr.split()))
 
 
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:

@@ -1083,6 +1083,33 @@ def test_simulate_refuses_in_a_line(tmp_path: Path, content: str | bytes, messag
     assert not (tmp_path / "out").exists()
 
 
+def test_simulate_writes_a_sequence(tmp_path: Path) -> None:
+    scene, path = tmp_path / "legs.xml", tmp_path / "run.h5"
+    scene.write_text(ROBOT.format(loss=0), encoding="utf-8")
+    words = ["simulate", scene, "--steps", 40, "--no-pictures"]
+    invoke(*words, "--out", tmp_path / "out", "--form", "global")
+    done = invoke(*words, "--out", path)
+    assert done.exit_code == 0, done.output
+    assert f"The sequence:  {path}" in done.output
+    files = sorted(tmp_path.glob("out/scenes/*/*.hdf5"))
+    steps: Any = fclib.Sequence(path)
+    assert len(steps) == len(files) > 10
+    for k, file in enumerate(files):
+        assert fclib.digest(steps[k]) == fclib.digest(fclib.read(file))
+        assert steps[k].info.description == fclib.read(file).info.description
+        assert steps[k].bodies is not None
+        assert (steps.solution(k).r == fclib.read_solution(file).r).all()
+        told = fclib.read_attributes(f"{path}#{k}", "solution")
+        assert told == fclib.read_attributes(file, "solution")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["legs.xml", "out", "run.h5"]
+    assert invoke("check", path).exit_code == 0
+    before = path.read_bytes()
+    done = invoke(*words, "--out", path)
+    assert done.exit_code == 1
+    assert "is there already; name another file" in done.output
+    assert path.read_bytes() == before
+
+
 def test_simulate_leaves_out_what_no_problem_holds_and_says_so(tmp_path: Path) -> None:
     path = tmp_path / "legs.xml"
     soft = ROBOT.format(loss=1).replace('mass="2"', 'mass="2" solref="0.05 1"')

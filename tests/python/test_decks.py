@@ -511,6 +511,17 @@ def test_contacts_are_those_within_the_alert_distance(tmp_path: Path) -> None:
     )
 
 
+def test_a_folder_that_is_no_deck_is_told_at_once(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["simulate", str(tmp_path)])
+    assert done.exit_code == 1
+    assert "is no deck of LMGC90" in done.output
+    assert "--time-step" not in done.output
+    write.blocks(tmp_path)
+    done = CliRunner().invoke(app, ["simulate", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "a deck does not say its step: --time-step" in done.output
+
+
 def test_a_periodic_deck_with_a_floor_that_moves(tmp_path: Path) -> None:
     """Two balls that meet across the boundary, on a plate that sinks: the cell moves as a whole."""
     bodies = [

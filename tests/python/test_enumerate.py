@@ -409,6 +409,37 @@ def test_a_contact_that_can_slide_or_stick_for_nothing() -> None:
     assert found.velocity_unique is False
 
 
+def test_joints_that_close_a_contact_leave_no_solution_after_condensation() -> None:
+    """What rounding leaves of W without V R^-1 V^T moves nothing, however large the reaction is."""
+    rng, tempted = np.random.default_rng(0), 0
+    for _ in range(150):
+        d, n = int(rng.choice([2, 3])), int(rng.integers(1, 4))
+        p = int(rng.integers(1, n + 1))
+        G = rng.integers(-3, 4, (n, p)) * 10.0 ** rng.integers(-4, 5, p)
+        share, H = rng.integers(-3, 4, p).astype(float), rng.integers(-3, 4, (n, d)).astype(float)
+        H[:, 0] = G @ share  # joints alone say how fast the contact closes
+        if np.linalg.matrix_rank(G) < p or not H[:, 0].any():
+            continue
+        b, w = rng.integers(-3, 4, p).astype(float), rng.integers(-3, 4, d).astype(float)
+        w[0] = share @ b - 10.0 ** rng.integers(-6, 3)
+        masses = (rng.integers(0, 4, n) + 0.5) * 10.0 ** rng.integers(-6, 7, n)
+        problem = fclib.GlobalProblem(
+            spacedim=d,
+            M=np.diag(masses),
+            H=H,
+            G=G,
+            f=rng.integers(-3, 4, n).astype(float),
+            w=w,
+            b=b,
+            mu=np.array([rng.choice([0.0, 0.5])]),
+        )
+        assert analysis.enumerate_solutions(problem).verdict != "exists"
+        found = analysis.enumerate_solutions(problem.condense())
+        assert found.verdict != "exists"
+        tempted += any(one.error <= 1e-8 for one in found.solutions)
+    assert tempted
+
+
 def test_what_rests_on_the_last_digits_is_not_claimed() -> None:
     # a light body under a heavy one: the only solution has reactions of 2^52
     W = np.kron([[1.0, -1.0], [-1.0, 1.0 + 2.0**-52]], np.eye(2))

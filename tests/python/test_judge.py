@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import re
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,7 @@ def test_criteria_do_not_depend_on_units() -> None:
         assert first[name] == pytest.approx(second[name], rel=1e-12), name
 
 
-def test_what_cannot_be_judged_is_named(tmp_path: Path) -> None:
+def test_what_cannot_be_judged_is_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ValueError, match="2 numbers, and the problem has 3"):
         recorders.criteria_of(block(), fclib.Solution(r=np.zeros(2)))
     fclib.write(tmp_path / "one.hdf5", block())
@@ -93,7 +94,22 @@ def test_what_cannot_be_judged_is_named(tmp_path: Path) -> None:
     ):
         done = CliRunner().invoke(app, ["judge", *words])
         assert done.exit_code == status, done.output
-        assert said in done.output
+        assert said in done.output + capfd.readouterr().err
+
+
+def test_huge_reactions_are_judged_as_such() -> None:
+    for size in (1e200, -1e200, 1e308):
+        solution = fclib.Solution(r=np.array([size, size, 0]))
+        found = recorders.criteria_of(block(), solution)
+        assert not any(math.isnan(value) for value in found.values())
+        assert found["error"] > 1e199
+        sign = fclib.Solution(r=np.array([1.0, 1.0, 0]) * math.copysign(1, size))
+        alike = recorders.criteria_of(block(), sign)
+        for name in ("tension", "cone"):
+            assert found[name] == pytest.approx(alike[name])
+        if size > 0:
+            assert found["distance"] > 1e199
+            assert found["energy"] > 1e199
 
 
 def test_runs_are_judged_side_by_side(tmp_path: Path) -> None:
@@ -140,6 +156,30 @@ def test_a_script_is_judged(tmp_path: Path) -> None:
     assert "dissipation" in done.output
 
 
+@pytest.mark.parametrize(("status", "said"), [(0, "dissipation"), (5, "ended with status 5")])
+def test_a_script_that_ends_its_process_is_judged(
+    status: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    script = tmp_path / "end.py"
+    script.write_text(
+        "import mujoco, os\n"
+        "model = mujoco.MjModel.from_xml_string(\n"
+        "    \"<mujoco><worldbody><geom type='plane' size='5 5 1'/><body pos='0 0 .0999'>\"\n"
+        "    \"<freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody></mujoco>\")\n"
+        "data = mujoco.MjData(model)\n"
+        f"mujoco.mj_step(model, data, 7)\nos._exit({status})\n"
+    )
+    done = CliRunner().invoke(app, ["judge", "mujoco", str(script), "--json"])
+    assert done.exit_code == min(status, 1), done.output
+    assert said in done.output
+    if not status:
+        assert len(done.output.splitlines()) == 7
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
 def test_a_sequence_is_judged_as_its_steps(tmp_path: Path) -> None:
     with fclib.SequenceWriter(tmp_path / "run.h5") as writer:
         for _ in range(3):
@@ -148,6 +188,8 @@ def test_a_sequence_is_judged_as_its_steps(tmp_path: Path) -> None:
         done = CliRunner().invoke(app, ["judge", str(what), "--json"])
         assert done.exit_code == 0, done.output
         assert len(done.output.splitlines()) == count
+    done = CliRunner().invoke(app, ["judge", str(tmp_path / "run.h5"), "--every", "2", "--json"])
+    assert len(done.output.splitlines()) == 2
 
 
 def test_a_bad_guess_names_its_file(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
+import html
 import re
 import subprocess
 import sys
@@ -50,6 +53,10 @@ def test_a_view_is_a_page_that_needs_no_other_file(tmp_path: Path) -> None:
         frame = shown._repr_html_()
         assert frame.startswith("<iframe srcdoc=")
         assert 'sandbox="allow-scripts"' in frame
+        assert len(frame) < 0.5 * len(text)
+        packed = re.search(r'atob\("([^"]+)"\)', html.unescape(frame))
+        assert packed is not None
+        assert gzip.decompress(base64.b64decode(packed[1])).decode() == text
 
 
 def test_a_plot_has_the_history() -> None:

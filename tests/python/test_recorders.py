@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 import subprocess
 import sys
 from importlib import metadata
@@ -998,6 +999,85 @@ def test_a_script_of_mujoco_is_recorded(tmp_path: Path) -> None:
     files = sorted((tmp_path / "out").glob("*.hdf5"))
     assert [file.name for file in files] == ["mujoco-000000.hdf5", "mujoco-000005.hdf5"]
     assert fclib.solve(fclib.read(files[0])).converged
+
+
+SPHERE = """
+import mujoco
+model = mujoco.MjModel.from_xml_string(
+    "<mujoco><option><flag autoreset='disable'/></option><worldbody>"
+    "<geom type='plane' size='1 1 1'/><body pos='0 0 .099'><freejoint/>"
+    "<geom size='.1'/></body>%s</worldbody></mujoco>")
+data = mujoco.MjData(model)
+"""
+CLOTH = (
+    "<flexcomp name='cloth' type='grid' count='3 3 1' spacing='.05 .05 .05' pos='.5 0 .02' dim='2'"
+    " radius='.01' mass='.1'><edge equality='true'/></flexcomp>"
+)
+
+
+def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    script, path = tmp_path / "drop.py", tmp_path / "new" / "run.h5"
+    script.write_text(SPHERE % "" + "mujoco.mj_step(model, data, 12)\n")
+    words = ["record", "mujoco", str(script), "--every", "3"]
+    done = CliRunner().invoke(app, [*words, "--out", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "4 of 12 steps" in done.output
+    CliRunner().invoke(app, [*words, "--out", str(tmp_path / "files")])
+    steps, files = fclib.Sequence(path), sorted((tmp_path / "files").iterdir())
+    assert len(steps) == len(files) == 4
+    for k, file in enumerate(files):
+        assert fclib.digest(steps[k]) == fclib.digest(fclib.read(file))
+        assert steps[k].info == fclib.read(file).info
+        (guess,), (same,) = steps.guesses(k), fclib.read_guesses(file)
+        assert (guess.r == same.r).all()
+    before = path.read_bytes()
+    done = CliRunner().invoke(app, [*words, "--out", str(path)])
+    assert done.exit_code == 1
+    assert "has steps already" in done.output
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("more", "text", "count", "said"),
+    [
+        (CLOTH, "", 0, "is one of a flexible body"),
+        (
+            "",
+            "data.xfrc_applied[1, 2] = math.nan\nmujoco.mj_step(model, data, 3)\n"
+            "mujoco.mj_resetData(model, data)\nmujoco.mj_step(model, data, 5)\n",
+            3,
+            "number 10, and 2 more. Of number 10: there is a number that is not finite",
+        ),
+    ],
+)
+def test_a_step_that_cannot_be_recorded_is_left_out(
+    more: str,
+    text: str,
+    count: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into a file there
+    script, path = tmp_path / "drop.py", tmp_path / "run.h5"
+    script.write_text(
+        SPHERE % more
+        + "import math\nmujoco.mj_step(model, data, 10)\n"
+        + (text or "mujoco.mj_step(model, data, 200)\n")
+        + "print(f'it ran to its end, with {data.time:.3f} s')\n"
+    )
+    done = CliRunner().invoke(app, ["record", "mujoco", str(script), "--out", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "it ran to its end, with" in done.output
+    assert said in " ".join(done.output.split())
+    left = re.search(r"(\d+) of (\d+) steps", done.output)
+    assert left is not None
+    assert len(fclib.Sequence(path)) == int(left[1]) > 5
+    if count:
+        assert int(left[2]) - int(left[1]) == count
+    assert all(np.isfinite(problem.f).all() for problem in fclib.Sequence(path))
 
 
 def test_what_is_not_recorded_of_mujoco_is_named() -> None:

@@ -17,6 +17,7 @@ import fclib
 from fclib.bench import profiles
 from fclib.collections import set_index, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
+from helpers import planted_global
 from helpers_browser import chromium
 from helpers_report import (
     LABELS,
@@ -493,6 +494,22 @@ def test_a_page_without_positions_says_so(browser: Any, collection: Path, tmp_pa
     said = page.inner_text(".scene")
     assert "A network without positions" in said
     assert "To scale" not in said
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
+def test_a_notebook_shows_a_view(browser: Any, tmp_path: Path) -> None:
+    """The frame of a cell: it unpacks the page, in a sandbox, without a request."""
+    made = planted_global(1)
+    problem: Any = made.problem.replace(info=fclib.ProblemInfo(title="A planted one"))
+    shown = problem.view(made.solution)._repr_html_()
+    cell = f"<main><h1>A cell</h1>{shown}</main>"
+    (tmp_path / "cell.html").write_text(cell, encoding="utf-8")
+    go = Opener(browser, tmp_path / "cell.html")
+    frame = go("").frame_locator("iframe")
+    assert frame.locator("main h1").inner_text() == "A planted one"
+    frame.locator(".scene .plot").first.wait_for()
     for context in go.contexts:
         context.close()
     assert not go.wrong

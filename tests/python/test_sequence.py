@@ -445,6 +445,16 @@ def not_a_number(group: Any) -> None:
     group["numbers"][:] = np.nan
 
 
+def steps_without(member: str) -> Change:
+    def change(group: Any) -> None:
+        rows = group["steps"][:]
+        del group["steps"]
+        kept = [name for name in rows.dtype.names if name != member]
+        group.create_dataset("steps", data=rows[kept].copy(), maxshape=(None,), chunks=(8,))
+
+    return change
+
+
 def other_type(group: Any) -> None:
     del group["entries"]
     group.create_dataset("entries", data=np.zeros(20), maxshape=(None,), chunks=(8,))
@@ -478,7 +488,8 @@ DAMAGED: list[tuple[Change, str]] = [
     (resized("steps", 2**60), r"/fclib_sequence/steps: has chunks that the file does not hold"),
     (resized("entries", 2**60), r"/fclib_sequence/entries: has chunks that the file does not hold"),
     (resized("numbers", 2**60), r"/fclib_sequence/numbers: has chunks that the file does not hold"),
-    (not_a_number, r"#1: /fclib_local/W\S*: the value is not a finite number"),
+    (not_a_number, r"#1: /fclib_sequence/steps\[1\]: .* its checksum is wrong"),
+    (steps_without("checksum"), "/fclib_sequence/steps: has no member checksum"),
     (other_type, "/fclib_sequence/entries: has entries of another type"),
     *(
         (lacks(name), f"/fclib_sequence/{name}: the dataset is missing")
@@ -533,6 +544,124 @@ def test_a_cut_sequence_is_refused_quickly(tmp_path: Path, writer: Path) -> None
     assert time.monotonic() - start < 60
 
 
+FLIPS = 250
+Read = tuple[fclib.Problem, fclib.Solution | None]
+
+
+def check_told(path: Path, whole: list[Read]) -> int:
+    """Each step is as it was written, or an error tells it. Return how many errors there are."""
+    told = []
+    for k, (problem, solution) in enumerate(whole):
+        try:
+            assert (read(f"{path}#{k}"), fclib.read_solution(f"{path}#{k}")) == (problem, solution)
+        except (fclib.FileError, fclib.ProblemError) as error:
+            told.append(str(error))
+    assert all(path.name in words for words in told)
+    return len(told)
+
+
+@pytest.mark.parametrize("compression", [0, 6])
+def test_a_flipped_byte_is_told(tmp_path: Path, compression: int) -> None:
+    random.seed(compression)
+    path, rng = tmp_path / "run.h5", np.random.default_rng(0)
+    whole: list[Read] = []
+    with SequenceWriter(path, compression=compression) as writer:
+        for seed in range(6):
+            made = planted_global(seed, nc=17)
+            q = made.problem.replace(f=rng.standard_normal(made.problem.n))
+            whole.append((q, made.solution))
+            writer.append(q, made.solution, world=seed % 2)
+    assert check_told(path, whole) == 0
+    intact, told = path.read_bytes(), 0
+    with h5py.File(path) as file:
+        used = [
+            (data.id.get_chunk_info(0).byte_offset, data.id.get_storage_size())
+            for data in file["fclib_sequence"].values()
+            if data.size
+        ]
+    for flip in range(FLIPS):
+        # of the headers, or of one of the datasets
+        start, size = random.choice([(0, len(intact)), *used]) if flip % 2 else (0, len(intact))
+        damaged = bytearray(intact)
+        damaged[start + random.randrange(min(size, len(intact) - start))] ^= 1 << flip % 8
+        path.write_bytes(damaged)
+        told += check_told(path, whole) > 0
+    assert told > FLIPS // 4
+    path.write_bytes(intact)
+    with h5py.File(path, "r+") as file:
+        file["fclib_sequence/numbers"][5] += 1e-12
+    done = run("check", path)
+    assert done.returncode == 1
+    assert "steps[0]: is not as it was written: its checksum is wrong" in done.stderr
+
+
+def test_options_are_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    for compression in (-1, 10, 99):
+        with pytest.raises(fclib.OptionError, match=f"compression.*is {compression}, but must be"):
+            SequenceWriter(path, compression=compression)
+        assert not path.exists()
+    with SequenceWriter(path) as writer:
+        writer.append(step(0))
+        with pytest.raises(fclib.OptionError, match="world: is -1, but must be 0 or more"):
+            writer.append(step(1), world=-1)
+        writer.append(step(2))
+    assert [problem.q[0] for problem in Sequence(path)] == [0, -2]
+
+
+TWICE = r"""
+#include <fclib.h>
+#include <stdio.h>
+
+int main(int argc, char **argv) {
+  double x[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, q[3] = {-1, 0, 0}, mu[1] = {0.5};
+  struct fclib_matrix W = {9, 3, 3, NULL, NULL, x, -3, NULL};
+  struct fclib_local problem = {&W, NULL, NULL, mu, q, NULL, 3, NULL};
+  struct fclib_solution solution = {NULL, q, q, NULL};
+  struct fclib_sequence *sequence = fclib_sequence_create(argv[argc - 1], NULL);
+  if (fclib_sequence_add_solution(sequence, &solution)) return 1;
+  printf("%s\n", fclib_last_error());
+  if (fclib_sequence_add_local(sequence, &problem, -1)) return 1;
+  printf("%s\n", fclib_last_error());
+  if (!fclib_sequence_add_local(sequence, &problem, 7)) return 1;
+  if (!fclib_sequence_add_solution(sequence, &solution)) return 1;
+  if (fclib_sequence_add_solution(sequence, &solution)) return 1;
+  printf("%s\n", fclib_last_error());
+  if (!fclib_sequence_add_guesses(sequence, 1, &solution)) return 1;
+  return !fclib_sequence_close(sequence);
+}
+"""
+
+
+def test_c_refuses_what_would_spoil_a_step(tmp_path: Path) -> None:
+    path, source = tmp_path / "run.h5", tmp_path / "twice.c"
+    source.write_text(TWICE)
+    program = compile_program(source, tmp_path / "twice")
+    done = subprocess.run([program, path], capture_output=True, text=True)
+    first, second, third = done.stdout.splitlines()
+    assert done.returncode == 0
+    assert "has no step yet" in first
+    assert "world: is -1, but must be 0 or more" in second
+    assert "/solution/u: was already given to this step" in third
+    steps = Sequence(path)
+    assert (steps.worlds, steps.numbers) == ([7], [0])
+    assert steps.solution(0) == fclib.Solution(r=[-1, 0, 0], u=[-1, 0, 0])
+    assert len(steps.guesses(0)) == 1
+
+
+def test_all_that_is_confirmed_is_read_while_it_grows(writer: Path, tmp_path: Path) -> None:
+    path, rounds, last = tmp_path / "run.h5", 0, 0
+    with subprocess.Popen([writer, path], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        end = time.monotonic() + 3
+        while time.monotonic() < end:
+            count = check_whole(path, last)
+            rounds, last = rounds + (count > last), count
+        process.kill()
+    assert rounds > 5
+
+
 # ---- the commands
 
 
@@ -549,6 +678,24 @@ def solved(tmp_path: Path) -> Path:
             made = planted_local(seed)
             writer.append(made.problem, made.solution)
     return path
+
+
+def test_a_sequence_without_a_step_is_no_success(tmp_path: Path) -> None:
+    path = tmp_path / "empty.h5"
+    record(path, 0)
+    assert len(Sequence(path)) == 0
+    for words in (("check", path), ("info", path), ("solve", path), ("judge", path)):
+        done = run(*words)
+        assert done.returncode == 1, words
+        assert f"{path}: /: is a sequence in which there is no step" in done.stderr
+    campaign = tmp_path / "empty.toml"
+    campaign.write_text(
+        'name = "empty"\nsolvers = ["auto"]\ntolerances = [1e-8]\n'
+        f'[[problems]]\nfiles = ["{path}"]\n'
+    )
+    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite")
+    assert done.returncode != 0
+    assert "is a sequence in which there is no step" in " ".join(done.stderr.split())
 
 
 def test_commands_take_a_sequence_and_its_steps(solved: Path) -> None:

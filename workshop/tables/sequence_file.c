@@ -27,7 +27,12 @@ static void next_step(unsigned long* state) {
   for (int k = 0; k < entries + n + m; k++) {
     *state = *state * 6364136223846793005UL + 1442695040888963407UL;
     const double number = (double)(*state >> 11) / 9007199254740992.0 - 0.5;
-    *(k < entries ? H + k : k < entries + n ? f + k - entries : w + k - entries - n) = number;
+    if (k < entries)
+      H[k] = number;
+    else if (k < entries + n)
+      f[k - entries] = number;
+    else
+      w[k - entries - n] = number < 0 ? -number : number; /* so there is a solution */
   }
 }
 

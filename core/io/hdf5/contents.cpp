@@ -16,6 +16,7 @@ std::vector<std::string> kinds_of(const Group& root) {
 
 void fail_without_problem(const Group& root, const std::string& more) {
   if (root.has(sequence_group)) {
+    if (StoredSequence(root).size() == 0) fail("/", "is a sequence in which there is no step");
     fail("/", "is a sequence of many problems: name one of them by FILE#NUMBER, the first is #0");
   }
   fail("/", "holds no problem in a known FCLIB layout" + more);

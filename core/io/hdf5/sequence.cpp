@@ -1,5 +1,7 @@
 #include "io/hdf5/sequence.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -10,9 +12,11 @@
 #include <span>
 #include <utility>
 
+#include "io/crc32.hpp"
 #include "io/hdf5/contents.hpp"
 #include "io/hdf5/geometry_groups.hpp"
 #include "io/hdf5/open.hpp"
+#include "io/hdf5/transaction.hpp"
 #include "io/hdf5/write_objects.hpp"
 #include "io/replace_file.hpp"
 #include "version.hpp"
@@ -198,6 +202,8 @@ class Growing {
   std::vector<char> pending_;
 };
 
+std::string group_of(const ProblemView& problem) { return "fclib_" + problem.kind + "/"; }
+
 template <class Values>
 std::span<const char> bytes_of(const Values& values) {
   return {reinterpret_cast<const char*>(values.data()),
@@ -209,6 +215,7 @@ std::span<const char> bytes_of(const Values& values) {
 class SequenceWriter::File {
  public:
   File(const std::string& path, const SequenceOptions& options) : path_(resolve_links(path)) {
+    require_level(options.compression);
     const Session session;
     in_file(path_, [&] {
       std::error_code unknown;
@@ -249,25 +256,38 @@ class SequenceWriter::File {
     });
   }
 
-  void begin(Index world) {
-    end_step();
-    world_ = world;
-    step_ = true;
-  }
-
-  [[nodiscard]] bool in_step() const { return step_; }
   [[nodiscard]] std::size_t size() const { return part(Part::steps).size() + (step_ ? 1 : 0); }
 
-  void require_step() const {
-    if (!step_) fail("", "no step has begun: its problem comes first");
+  /// Begins a step with its problem. After an error there is no step.
+  void begin(const ProblemView& problem, Index world) {
+    locked([&] {
+      if (world < 0) {
+        throw Error(ErrorKind::option, "is " + std::to_string(world) + ", but must be 0 or more",
+                    "world");
+      }
+      end_step();
+      world_ = world;
+      all_or_nothing([&] { put_problem(problem); });
+      step_ = true;
+    });
+  }
+
+  /// Adds all that `body` puts to the step, or nothing.
+  template <class Body>
+  void add_to_step(const Body& body) {
+    locked([&] {
+      if (!step_) fail("", "no step has begun: its problem comes first");
+      all_or_nothing(body);
+    });
   }
 
   template <class Values>
   void put(Pool pool, const std::string& path, const Values& values) {
-    put(pool, path, static_cast<std::size_t>(values.size()), bytes_of(values));
+    put_array({pool, path}, static_cast<std::size_t>(values.size()), bytes_of(values),
+              [&] { return crc32_of(values); });
   }
   void put_number(const std::string& path, Index value) {
-    put(Pool::integers, path, 1, {reinterpret_cast<const char*>(&value), sizeof value});
+    put(Pool::integers, path, std::array<Index, 1>{value});
   }
   void put_text(const std::string& path, const std::string& text) { put(Pool::texts, path, text); }
 
@@ -293,6 +313,27 @@ class SequenceWriter::File {
       }
     });
   }
+  void put_problem(const ProblemView& problem) {
+    const std::string group = group_of(problem);
+    for (const ProblemView::Member& member : problem.members) {
+      const std::string name = group + std::string(member.name);
+      std::visit(
+          [&]<class Value>(const Value& value) {
+            if constexpr (std::is_same_v<Value, RawMatrixView>) {
+              put_matrix(name + "/", value);
+            } else if constexpr (std::is_same_v<Value, Index>) {
+              put_number(name, value);
+            } else {
+              put(Pool::numbers, group + "vectors/" + std::string(member.name), value);
+            }
+          },
+          member.value);
+    }
+    for_each_field<ProblemInfo>([&](const auto& field) {
+      const std::string& text = problem.info.*field.member;
+      if (is_there(text)) put_text(group + "info/" + std::string(field.name), text);
+    });
+  }
   void put_solution(const std::string& group, const Solution& solution) {
     for_each_field<Solution>([&](const auto& field) {
       const Vector& values = solution.*field.member;
@@ -305,10 +346,12 @@ class SequenceWriter::File {
     if (!step_) return;
     step_ = false;
     part(Part::entries).put(bytes_of(entries_));
-    const std::array<StepRow, 1> row{
-        StepRow{static_cast<std::int64_t>(part(Part::entries).size()), world_, numbers_[world_]++}};
+    const Index number = numbers_[world_]++;
+    const std::array<StepRow, 1> row{StepRow{static_cast<std::int64_t>(part(Part::entries).size()),
+                                             world_, number, checksum_.of(world_, number)}};
     part(Part::steps).put(bytes_of(row));
     entries_.clear();
+    checksum_ = {};
     std::size_t pending = 0;
     for (const Growing& one : parts_) pending += one.pending();
     const auto now = std::chrono::steady_clock::now();
@@ -337,6 +380,19 @@ class SequenceWriter::File {
   }
 
  private:
+  template <class Body>
+  void all_or_nothing(const Body& body) {
+    const std::size_t before = entries_.size();
+    const StepChecksum checksum = checksum_;
+    try {
+      body();
+    } catch (...) {
+      entries_.resize(before);
+      checksum_ = checksum;
+      throw;
+    }
+  }
+
   /// Makes sure that there is room for all that is pending: after a failed write HDF5 is no longer
   /// in good order, so a full disk must be known before.
   void reserve() {
@@ -360,6 +416,7 @@ class SequenceWriter::File {
   struct Last {
     Entry entry;
     std::vector<char> bytes;
+    std::uint32_t checksum = 0;
   };
 
   [[nodiscard]] Growing& part(Part which) { return parts_[static_cast<std::size_t>(which)]; }
@@ -387,9 +444,7 @@ class SequenceWriter::File {
   void go_on() {
     const StoredSequence stored({file_->id(), "/"});
     for (const ArrayName& name : stored.names()) {
-      const std::string line =
-          std::string(pool_names[static_cast<std::size_t>(name.pool)]) + " " + name.path;
-      names_.emplace(line, static_cast<std::int32_t>(names_.size()));
+      names_.emplace(name.line(), static_cast<std::int32_t>(names_.size()));
     }
     std::int64_t end = 0;
     for (const StepRow& row : stored.rows(0, stored.size())) {
@@ -402,8 +457,7 @@ class SequenceWriter::File {
     }
   }
 
-  std::int32_t number_of(Pool pool, const std::string& path) {
-    const std::string line = std::string(pool_names[static_cast<std::size_t>(pool)]) + " " + path;
+  std::int32_t number_of(const std::string& line) {
     const auto [known, fresh] = names_.emplace(line, static_cast<std::int32_t>(names_.size()));
     if (fresh) {
       part(Part::names).put(line);
@@ -412,25 +466,30 @@ class SequenceWriter::File {
     return known->second;
   }
 
-  void put(Pool pool, const std::string& path, std::size_t length, std::span<const char> bytes) {
-    const std::int32_t name = number_of(pool, path);
+  template <class Checksum>
+  void put_array(const ArrayName& array, std::size_t length, std::span<const char> bytes,
+                 const Checksum& checksum) {
+    const std::string line = array.line();
+    const std::int32_t name = number_of(line);
+    for (const Entry& entry : entries_) {
+      if (entry.name == name) fail("/" + array.path, "was already given to this step");
+    }
     if (length > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
-      fail("/" + path, "has " + std::to_string(length) + " entries, more than can be numbered");
+      fail("/" + array.path,
+           "has " + std::to_string(length) + " entries, more than can be numbered");
     }
-    Last& last = last_[{world_, name}];
-    const bool same =
-        last.entry.length == static_cast<std::int32_t>(length) &&
-        last.bytes.size() == bytes.size() &&
-        (bytes.empty() || std::memcmp(last.bytes.data(), bytes.data(), bytes.size()) == 0);
-    if (!same) {
-      Growing& target = part(part_of(pool));
-      last.entry = {name, static_cast<std::int32_t>(length),
-                    static_cast<std::int64_t>(target.size())};
-      last.bytes.assign(bytes.begin(), bytes.end());
+    const auto [known, fresh] = last_.try_emplace({world_, name});
+    Last& last = known->second;
+    if (fresh || !std::equal(bytes.begin(), bytes.end(), last.bytes.begin(), last.bytes.end())) {
+      Growing& target = part(part_of(array.pool));
+      const auto start = static_cast<std::int64_t>(target.size());
       target.put(bytes);
+      last.bytes.assign(bytes.begin(), bytes.end());
+      last.entry = {name, static_cast<std::int32_t>(length), start};
+      last.checksum = checksum();
     }
-    last.entry.name = name;
     entries_.push_back(last.entry);
+    checksum_.add(line, last.checksum);
   }
 
   std::string path_;
@@ -442,6 +501,7 @@ class SequenceWriter::File {
   std::map<std::pair<Index, std::int32_t>, Last> last_;
   std::map<Index, Index> numbers_;
   std::vector<Entry> entries_;  // of the step that has begun
+  StepChecksum checksum_;       // likewise
   Index world_ = 0;
   bool step_ = false;
   bool failed_ = false;
@@ -461,42 +521,17 @@ SequenceWriter::~SequenceWriter() {
 }
 
 void SequenceWriter::add(const ProblemView& problem, Index world) {
-  file_->locked([&] {
-    file_->begin(world);
-    const std::string group = "fclib_" + problem.kind + "/";
-    for (const ProblemView::Member& member : problem.members) {
-      const std::string name = group + std::string(member.name);
-      std::visit(
-          [&]<class Value>(const Value& value) {
-            if constexpr (std::is_same_v<Value, RawMatrixView>) {
-              file_->put_matrix(name + "/", value);
-            } else if constexpr (std::is_same_v<Value, Index>) {
-              file_->put_number(name, value);
-            } else {
-              file_->put(Pool::numbers, group + "vectors/" + std::string(member.name), value);
-            }
-          },
-          member.value);
-    }
-    for_each_field<ProblemInfo>([&](const auto& field) {
-      const std::string& text = problem.info.*field.member;
-      if (is_there(text)) file_->put_text(group + "info/" + std::string(field.name), text);
-    });
-    info_ = group + "info";
-  });
+  file_->begin(problem, world);
+  info_ = group_of(problem) + "info";
   if (problem.geometry) add_geometry(*problem.geometry);
 }
 
 void SequenceWriter::add_solution(const Solution& solution) {
-  file_->locked([&] {
-    file_->require_step();
-    file_->put_solution("solution/", solution);
-  });
+  file_->add_to_step([&] { file_->put_solution("solution/", solution); });
 }
 
 void SequenceWriter::add_guesses(const std::vector<Solution>& guesses) {
-  file_->locked([&] {
-    file_->require_step();
+  file_->add_to_step([&] {
     const std::string group = std::string(guesses_list.group) + "/";
     for (std::size_t k = 0; k < guesses.size(); ++k) {
       file_->put_solution(group + std::to_string(k + 1) + "/", guesses[k]);
@@ -506,8 +541,7 @@ void SequenceWriter::add_guesses(const std::vector<Solution>& guesses) {
 }
 
 void SequenceWriter::add_geometry(const Geometry& geometry) {
-  file_->locked([&] {
-    file_->require_step();
+  file_->add_to_step([&] {
     Geometry::for_each_table([&](std::string_view name, Geometry::Table Geometry::* member) {
       const std::string group(name);
       if ((geometry.*member).empty()) return;
@@ -530,8 +564,7 @@ void SequenceWriter::add_geometry(const Geometry& geometry) {
 }
 
 void SequenceWriter::add_attributes(const std::string& group, const Attributes& attributes) {
-  file_->locked([&] {
-    file_->require_step();
+  file_->add_to_step([&] {
     const std::string own = (group == "info" ? info_ : group) + "@";
     for (const auto& [name, value] : attributes) {
       if (const auto* text = std::get_if<std::string>(&value)) {

@@ -37,7 +37,7 @@ struct SequenceOptions {
 /// step comes from one of them.
 class SequenceWriter {
  public:
-  /// Throws Error (file) if another program writes to the file.
+  /// Throws Error (file) if another program writes to the file, (option) for another compression.
   explicit SequenceWriter(const std::string& path, const SequenceOptions& options = {});
   /// Closes the file. close() reports errors.
   ~SequenceWriter();
@@ -45,7 +45,7 @@ class SequenceWriter {
   SequenceWriter& operator=(const SequenceWriter&) = delete;
 
   /// Begins a step with its problem. An array that is equal to the last one of its name in its
-  /// world is stored once. Nothing is checked.
+  /// world is stored once. Only the world is checked: it is 0 or more.
   void add(const ProblemView& problem, Index world = 0);
   // ... and what else belongs to the step. The sizes are not checked
   void add_solution(const Solution& solution);

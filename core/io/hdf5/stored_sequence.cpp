@@ -6,6 +6,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "io/crc32.hpp"
 #include "io/hdf5/write_objects.hpp"
 #include "number_text.hpp"
 
@@ -26,7 +27,22 @@ Handle compound(Side side, const Members&... members) {
     H5Tinsert(type.id(), name, offset, side == Side::file ? stored : native);
   };
   (add(members), ...);
+  if (side == Side::file) H5Tpack(type.id());
   return type;
+}
+
+/// Opens a dataset of records that has all members of this type.
+Rows open_records(const Group& group, const std::string& name, const Handle& type) {
+  Rows rows = open_rows(group, name, H5T_COMPOUND);
+  const Handle stored(H5Dget_type(rows.id.id()), H5Tclose);
+  for (int k = 0; k < H5Tget_nmembers(type.id()); ++k) {
+    char* const member = H5Tget_member_name(type.id(), static_cast<unsigned>(k));
+    const bool there = H5Tget_member_index(stored.id(), member) >= 0;
+    const std::string missing = member;
+    H5free_memory(member);
+    if (!there) fail(rows.path, "has no member " + missing);
+  }
+  return rows;
 }
 
 std::string at(const std::string& path, std::size_t k) {
@@ -127,6 +143,18 @@ class Tree {
 
 }  // namespace
 
+std::string ArrayName::line() const {
+  return std::string(pool_names[static_cast<std::size_t>(pool)]) + " " + path;
+}
+
+void StepChecksum::add(std::string_view line, std::uint32_t of_array) {
+  sum_ = crc32_of(std::array{of_array}, crc32(line, sum_));
+}
+
+std::uint32_t StepChecksum::of(std::int32_t world, std::int32_t number) const {
+  return crc32_of(std::array{world, number}, sum_);
+}
+
 Handle type_of_entry(Side side) {
   return compound<Entry>(
       side, std::tuple("name", offsetof(Entry, name), H5T_STD_I32LE, H5T_NATIVE_INT32),
@@ -138,7 +166,8 @@ Handle type_of_step(Side side) {
   return compound<StepRow>(
       side, std::tuple("end", offsetof(StepRow, end), H5T_STD_I64LE, H5T_NATIVE_INT64),
       std::tuple("world", offsetof(StepRow, world), H5T_STD_I32LE, H5T_NATIVE_INT32),
-      std::tuple("number", offsetof(StepRow, number), H5T_STD_I32LE, H5T_NATIVE_INT32));
+      std::tuple("number", offsetof(StepRow, number), H5T_STD_I32LE, H5T_NATIVE_INT32),
+      std::tuple("checksum", offsetof(StepRow, checksum), H5T_STD_U32LE, H5T_NATIVE_UINT32));
 }
 
 // A file may grow while it is read. All that a step refers to was written before it, so the steps
@@ -146,8 +175,8 @@ Handle type_of_step(Side side) {
 StoredSequence::StoredSequence(const Group& root)
     : group_(open_group(root, sequence_group)),
       path_(root.child(sequence_group)),
-      steps_(open_rows({group_.id(), path_}, "steps", H5T_COMPOUND)),
-      entries_(open_rows({group_.id(), path_}, "entries", H5T_COMPOUND)),
+      steps_(open_records({group_.id(), path_}, "steps", type_of_step(Side::memory))),
+      entries_(open_records({group_.id(), path_}, "entries", type_of_entry(Side::memory))),
       names_(read_names({group_.id(), path_})) {
   for (const Pool pool : {Pool::numbers, Pool::integers, Pool::texts}) {
     pools_.push_back(open_pool({group_.id(), path_}, pool));
@@ -215,6 +244,7 @@ std::unique_ptr<StepFile> StoredSequence::step(std::size_t k) const {
   const Style style(0, [&](const void* data, std::size_t size) { made->file_.lend(data, size); });
   const Target root{made->root(), &style};
   Tree tree(root);
+  StepChecksum checksum;
   for (const Entry& entry : entries_of(k)) {
     const ArrayName& name = names_[static_cast<std::size_t>(entry.name)];
     const auto length = static_cast<std::size_t>(entry.length);
@@ -223,12 +253,18 @@ std::unique_ptr<StepFile> StoredSequence::step(std::size_t k) const {
     const auto take = [&](auto values, hid_t memory) {
       values.resize(length);
       read_rows(pool, start, length, memory, values.data());
+      checksum.add(name.line(), crc32_of(values));
       const auto& kept = made->arrays_.emplace_back(std::move(values));
       tree.write(name.path, std::get<decltype(values)>(kept));
     };
     if (name.pool == Pool::numbers) take(std::vector<double>(), H5T_NATIVE_DOUBLE);
     if (name.pool == Pool::integers) take(std::vector<std::int32_t>(), H5T_NATIVE_INT32);
     if (name.pool == Pool::texts) take(std::string(), H5T_NATIVE_UINT8);
+  }
+  const StepRow row = rows(k, 1).front();
+  if (checksum.of(row.world, row.number) != row.checksum) {
+    fail(at(steps_.path, k),
+         "is not as it was written: its checksum is wrong. The file is damaged");
   }
   return made;
 }

@@ -5,15 +5,17 @@
 //     problem numbers    doubles, one array after another integers   32-bit integers, likewise
 //     texts      bytes, likewise
 //     entries    (name, length, start): the arrays of each step, one step after another
-//     steps      (end, world, number): where the entries of a step end. Written last
+//     steps      (end, world, number, checksum): where the entries of a step end. Written last
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <list>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -38,9 +40,21 @@ struct Entry {
 
 /// One step.
 struct StepRow {
-  std::int64_t end;     ///< of its entries; they begin at the end of the step before
-  std::int32_t world;   ///< which of several simulations that were recorded together
-  std::int32_t number;  ///< among the steps of its world, from 0
+  std::int64_t end;        ///< of its entries; they begin at the end of the step before
+  std::int32_t world;      ///< which of several simulations that were recorded together
+  std::int32_t number;     ///< among the steps of its world, from 0
+  std::uint32_t checksum;  ///< see StepChecksum
+};
+
+/// CRC-32 of all that a step is: of each array in their order its line in `names`, and the CRC-32
+/// of its numbers; then the step's world and number.
+class StepChecksum {
+ public:
+  void add(std::string_view line, std::uint32_t of_array);
+  [[nodiscard]] std::uint32_t of(std::int32_t world, std::int32_t number) const;
+
+ private:
+  std::uint32_t sum_ = 0;
 };
 
 /// Their types, packed as in memory: of the file, in little endian, or of this machine.
@@ -52,6 +66,8 @@ Handle type_of_step(Side side);
 struct ArrayName {
   Pool pool;
   std::string path;
+
+  [[nodiscard]] std::string line() const;
 };
 
 /// The file of one step, in memory.
@@ -74,7 +90,7 @@ class StoredSequence {
   [[nodiscard]] std::vector<StepRow> rows(std::size_t first, std::size_t count) const;
   [[nodiscard]] const std::vector<ArrayName>& names() const { return names_; }
 
-  /// Makes the file that would have this step alone.
+  /// Makes the file that would have this step alone. Throws if it is not what was written.
   [[nodiscard]] std::unique_ptr<StepFile> step(std::size_t k) const;
 
  private:

@@ -23,14 +23,14 @@ MemoryFile copy_of(const std::string& path) {
   }
 }
 
+}  // namespace
+
 void require_level(int compression) {
   if (compression < 0 || compression > 9) {
     throw Error(ErrorKind::option, "is " + std::to_string(compression) + ", but must be 0 to 9",
                 "the compression level");
   }
 }
-
-}  // namespace
 
 void change_file(const std::string& path, Start start, int compression,
                  const std::function<void(const Target& root)>& change,

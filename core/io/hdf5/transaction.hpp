@@ -8,6 +8,9 @@
 
 namespace fclib::hdf5 {
 
+/// Throws Error (option) if deflate has no such level.
+void require_level(int compression);
+
 /// What a change starts from.
 enum class Start { existing, empty, existing_or_empty };
 

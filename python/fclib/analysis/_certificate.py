@@ -28,6 +28,7 @@ import scipy.sparse as sp
 from scipy.linalg import qr
 
 from fclib import _core, _digest, _laws, _solve
+from fclib._regular import regular
 from fclib.analysis._data import Array
 
 LAST_DIGITS = 8  # the rest may be so many times the rounding of W's last digits
@@ -455,7 +456,7 @@ def read_certificate(path: str | Path) -> tuple[dict[int, Any], dict[int, Any], 
         fclib.FileError: the file is not a certificate.
     """
     try:
-        record = json.loads(Path(path).read_text())
+        record = json.loads(regular(path).read_text())
         record = record.get("certificate") or record
         y, z = record["y"], record.get("z") or {}
         parts = [

@@ -39,7 +39,9 @@ from fclib.analysis._spatial import one_contact
 MOST_STATES = 4**8  # largest number of states of all contacts together
 MOST_UNKNOWNS = 200  # largest n + p that is eliminated in rational arithmetic
 ROBUST = 1e-6  # in ||(q, s)||: a state that such a change of q and s makes solvable is not refuted
-SOUND = 1e-8  # a solution with a smaller error in doubles does not depend on the data's last digits
+# a solution does not depend on the data's last digits if its error in doubles is below this, and so
+# is the part of the reactions' effect that the last digits decide
+SOUND = 1e-8
 FEW_STATES = 64  # up to so many states, doubles are not tried first
 # bounds of numbers that are rounded to doubles
 LARGEST, SMALLEST = Fraction(10**300), Fraction(1, 10**290)
@@ -62,6 +64,9 @@ class SolutionSet:
             friction, "closed".
         solution: one of the solutions, in doubles.
         error: its merit in doubles, without the unscaled natural map: it is the same in all units.
+        undone: how much of the effect of the reactions on a contact the last digits of the data
+            can undo. Joints that leave a contact no freedom also leave rounding, by which a
+            reaction of any size seems to move it: then it is about 1.
         velocity: whether all solutions have this u.
         reaction: whether all solutions have this r.
         isolated: whether it is a point, with no other solution near it.
@@ -71,6 +76,7 @@ class SolutionSet:
     states: tuple[str, ...]
     solution: _core.Solution = field(repr=False, compare=False)
     error: float
+    undone: float
     velocity: bool
     reaction: bool
     isolated: bool
@@ -136,8 +142,7 @@ class Enumeration:
     def verdict(self) -> str:
         """One of "exists", "none" and "undecided".
 
-        If the error of a solution in doubles is above 1e-8, it depends on the last digits of the
-        data, and is not enough.
+        A solution that depends on the last digits of the data is not enough.
         """
         if self.sound:
             return EXISTS
@@ -145,8 +150,8 @@ class Enumeration:
 
     @property
     def sound(self) -> tuple[SolutionSet, ...]:
-        """The sets whose solution is also one in doubles, with an error up to 1e-8."""
-        return tuple(found for found in self.solutions if found.error <= SOUND)
+        """The sets whose solution is also one in doubles, by SOUND."""
+        return tuple(found for found in self.solutions if max(found.error, found.undone) <= SOUND)
 
     @property
     def isolated(self) -> tuple[SolutionSet, ...]:
@@ -183,6 +188,47 @@ class Enumeration:
 def _error(problem: _solve.Problem, solution: _core.Solution) -> float:
     merit = _core.merit(problem, solution)
     return max(merit.scaled_natural, merit.dynamics, merit.bilateral, merit.kinematics)
+
+
+def _undone(whole: _Whole, u: Numbers, r: Numbers) -> float:
+    """See SolutionSet."""
+    if not whole.plain:
+        return 0.0
+    local: Any = whole.problem
+    bodies = isinstance(local, _laws.Global)
+    if bodies:
+        local = local.condense()
+    m, p, d = local.m, local.p, local.spacedim
+    reaction = np.array([float(max(-LARGEST, min(LARGEST, value))) for value in r])
+    W, V, R = columns(local.W).toarray(), np.zeros((m, 0)), np.zeros((0, 0))
+    if p:
+        V, R = columns(local.V).toarray(), columns(local.R).toarray()
+    inverse = np.linalg.pinv(R)
+
+    def through_joints(right: Array, parts: Array) -> Array:
+        """The terms of V R^-1 right, with those of solving for the multipliers."""
+        multipliers = abs(inverse @ right)
+        return abs(V) @ (multipliers + abs(inverse) @ (abs(R) @ multipliers + parts))
+
+    # the terms of what reactions do, and what is left of them with the joints
+    terms = abs(W) @ abs(reaction) + through_joints(V.T @ reaction, abs(V).T @ abs(reaction))
+    effects = np.zeros(m)
+    shares = [0.0]
+    for own, row, constant, _ in whole.rows():
+        moved = sum((abs(value * r[k]) for k, value in row.items()), Fraction())
+        effects[own] = float(min(LARGEST, max(moved, abs(constant))))
+        # a contact that only rounding can move must open by more than rounding
+        if own % d or r[own] or bodies or not p:
+            continue
+        size = abs(W[own, own]) + through_joints(V[own], abs(V[own]))[own]
+        if EPS * size > SOUND * abs(float(row.get(own, 0))):
+            given = abs(local.q[own]) + through_joints(local.s, abs(local.s))[own]
+            shares.append(EPS * float(terms[own] + given) / max(float(u[own]), float(SMALLEST)))
+    by_contact = [part.reshape(-1, d).max(axis=1) for part in (terms, effects)]
+    pressed = reaction.reshape(-1, d).any(axis=1) & (by_contact[0] > 0)
+    with np.errstate(divide="ignore", over="ignore"):
+        shares += list(EPS * by_contact[0][pressed] / by_contact[1][pressed])
+    return float(max(shares))
 
 
 def _apart(a: Numbers, b: Numbers, size: float = 0.0) -> bool:
@@ -237,11 +283,11 @@ class _Whole:
             for k, value in self.elimination.complete({free: Fraction(1)}, 0).items()
         )
 
-    def rows(self) -> list[tuple[dict[int, Fraction], Fraction, float]]:
+    def rows(self) -> list[tuple[int, dict[int, Fraction], Fraction, float]]:
         """For a plain system, each remaining u_k = row . r + constant, in order.
 
-        Each entry has the row (by components of r), the constant, and the largest change of u_k if
-        q and the right sides of the joints change by 1.
+        Each entry has k, the row (by components of r), the constant, and the largest change of u_k
+        if q and the right sides of the joints change by 1.
         """
         m = self.problem.m
         result = []
@@ -252,8 +298,8 @@ class _Whole:
             by = equation[own]
             row = {k - m: -value / by for k, value in equation.items() if m <= k < 2 * m}
             moved = 1 + sum(abs(float(equation.get(k, 0) / by)) for k in self.changes)
-            result.append((own, (row, equation.get(CONSTANT, Fraction()) / by, moved)))
-        return [values for _, values in sorted(result, key=lambda one: one[0])]
+            result.append((own, row, equation.get(CONSTANT, Fraction()) / by, moved))
+        return sorted(result, key=lambda one: one[0])
 
     def solution(self, whole: dict[int, Fraction]) -> _core.Solution:
         """The values of all unknowns, in doubles."""
@@ -336,7 +382,7 @@ class _System:
         m = self.problem.m
         reactions = [k for k, part in enumerate(self.parts) if part[0][0] >= m]
         G, q, moved = [], [], []
-        for row, constant, by in self.whole.rows():
+        for _, row, constant, by in self.whole.rows():
             q.append(_double(constant))
             moved.append(by)
             G.append(
@@ -502,8 +548,8 @@ def _single(whole: _Whole) -> Enumeration:
     if not whole.plain:
         return Enumeration((), "redundant joints act on the contact")
     rows = whole.rows()
-    W = [[row.get(k, Fraction()) for k in range(3)] for row, *_ in rows]
-    q = [constant for _, constant, _ in rows]
+    W = [[row.get(k, Fraction()) for k in range(3)] for _, row, _, _ in rows]
+    q = [constant for _, _, constant, _ in rows]
     speed = _speed(problem)
     change = ROBUST * speed * max(moved for *_, moved in rows)
     result = one_contact(W, q, whole.mu[0], change)
@@ -517,6 +563,7 @@ def _single(whole: _Whole) -> Enumeration:
                 (one.state,),
                 solution,
                 _error(problem, solution),
+                _undone(whole, one.u, one.r),
                 one.velocity,
                 one.reaction,
                 alone,
@@ -679,6 +726,7 @@ class _Search:
                     tuple(self.system.states[a][s].name for a, s in enumerate(states)),
                     solution,
                     _error(self.problem, solution),
+                    _undone(self.system.whole, u, r),
                     velocity,
                     reaction,
                     alone,

@@ -21,6 +21,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
+from fclib._regular import regular
 from fclib._solve import MeritKind
 from fclib._suggest import suggestion
 from fclib.bench import generated, problems
@@ -146,7 +147,7 @@ class Campaign:
         if not file.exists() and (PUBLISHED / f"{path}.toml").exists():
             file = PUBLISHED / f"{path}.toml"
         try:
-            text = file.read_text(encoding="utf-8")
+            text = regular(file).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             word = error.strerror if isinstance(error, OSError) else "is no text"
             known = ", ".join(sorted(p.stem for p in PUBLISHED.glob("*.toml")))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections import Counter
 from enum import Enum
 from pathlib import Path
@@ -47,9 +48,17 @@ Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distributi
 
 
 def build_plans(
-    plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
+    plans: list[collections.Plan],
+    folder: Path,
+    jobs: int | None,
+    pictures: bool,
+    as_json: bool,
+    sequence: Path | None = None,
 ) -> None:
-    """Build plans, and print the results; exit status 1 if a problem was not solved."""
+    """Build plans, and print the results; exit status 1 if a problem was not solved.
+
+    With `sequence` the problems go from the folder into that file, and the folder is removed.
+    """
     told = [plan.name for plan in plans if plan.trajectory is None and simulated(plan)]
     if told:
         err.print(
@@ -103,7 +112,16 @@ def build_plans(
                 "The files say what is cheap to find out. --analyze finds the rest: self-stresses, "
                 "and whether there is a solution if that is hard to tell."
             )
-        out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
+        if sequence is None:
+            out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
+    if sequence is not None:
+        try:
+            collections.write_sequence(sequence, folder, rows)
+            shutil.rmtree(folder)
+        except OSError as error:
+            fail(words_of(error))
+        if not as_json:
+            out.print(f"The sequence:  {sequence}")
     raise typer.Exit(int(report.failed))
 
 

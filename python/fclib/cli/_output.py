@@ -30,6 +30,7 @@ from rich.text import Text
 
 import fclib
 from fclib import _sequence
+from fclib._regular import regular
 
 
 def plain(text: str) -> str:
@@ -181,7 +182,7 @@ def parse_options(pairs: Sequence[str]) -> dict[str, str]:
         options[name] = value
         if value.startswith("@"):
             try:
-                options[name] = Path(value[1:]).read_text(encoding="utf-8")
+                options[name] = regular(value[1:]).read_text(encoding="utf-8")
             except (OSError, UnicodeDecodeError) as error:
                 raise typer.BadParameter(f"'{pair}': {error}") from error
     return options

@@ -15,6 +15,7 @@ import typer
 import fclib
 from fclib import collections
 from fclib._judge import TOLERANCE
+from fclib._regular import regular
 from fclib._verdicts import CLASSES
 from fclib.bench import Store
 from fclib.cli._build import (
@@ -70,7 +71,7 @@ def named(names: list[str] | None, path: Path | None) -> list[str]:
     found = list(names or [])
     if path is not None:
         try:
-            lines = path.read_text(encoding="utf-8").splitlines()
+            lines = regular(path).read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeError) as error:
             fail(f"{path}: cannot be read as a list of names: {error}")
         found += [line.strip() for line in lines if line.strip() and line.strip()[0] != "#"]

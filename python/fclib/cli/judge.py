@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,9 +14,8 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib._sequence import SUFFIXES
 from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, steps_of, usage_error
-
-SUFFIXES = (".hdf5", ".h5")
 
 
 def command(
@@ -32,7 +33,7 @@ def command(
     table: Annotated[
         Path | None, typer.Option("--csv", help="Write a row for each step here.")
     ] = None,
-    every: Annotated[int, typer.Option(help="Of a script, judge one step in so many.", min=1)] = 1,
+    every: Annotated[int, typer.Option(help="Judge one step in so many.", min=1)] = 1,
     as_json: Json = False,
 ) -> None:
     """Judge a whole run of a simulator by Coulomb's law.
@@ -50,18 +51,11 @@ def command(
         if len(what) < 2:
             usage_error(ValueError(f"{what[0]}: name a script: fclib judge {what[0]} SCRIPT"))
         with tempfile.TemporaryDirectory(prefix="fclib-judge-") as temporary:
-            folder = Path(temporary) / "steps"
-            try:
-                recording = recorders.record_script(
-                    what[0], what[1], folder, every=every, arguments=what[2:]
-                )
-            except (ImportError, OSError, ValueError) as error:
-                fail(str(error))
-            if not recording.written:
-                fail(f"{what[1]}: {recording.nothing(what[0])}")
-            runs = judged({Path(what[1]).stem: folder})
+            file = Path(temporary) / "steps.h5"
+            record_apart(what[0], what[1:], file, every)
+            runs = judged({Path(what[1]).stem: file}, 1)
     else:
-        runs = judged({one.rstrip("/"): Path(one) for one in what})
+        runs = judged({one.rstrip("/"): Path(one) for one in what}, every)
     report = Report(as_json)
     rows = []
     for name, steps in runs.items():
@@ -91,8 +85,20 @@ def command(
         out.print(f"{name:12}{meaning}", highlight=False)
 
 
-def judged(folders: dict[str, Path]) -> dict[str, Sequence[Any]]:
-    """The steps of each folder, judged; the command ends if there are none."""
+def record_apart(engine: str, script: Sequence[str], file: Path, every: int) -> None:
+    """Record a script in a process of its own, which it may end; the command ends if it fails."""
+    command = [sys.executable, "-m", "fclib", "record", engine, "--out", str(file)]
+    command += ["--every", str(every), "--", *script]
+    # what the script prints is no result of this command
+    status = subprocess.run(command, stdout=2, check=False).returncode
+    if status:
+        fail(f"{script[0]}: ended with status {status}; what it said is above")
+    if not file.exists():
+        fail(f"{script[0]}: no step was recorded; the reason is above")
+
+
+def judged(folders: dict[str, Path], every: int) -> dict[str, Sequence[Any]]:
+    """One step in so many of each folder, judged; the command ends if there are none."""
     from fclib import recorders
 
     runs: dict[str, Sequence[Any]] = {}
@@ -102,6 +108,7 @@ def judged(folders: dict[str, Path]) -> dict[str, Sequence[Any]]:
             fail(f"{name!r}: is neither a folder, a file nor an engine; there is: {known}")
         found = sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES)
         files = [step for one in found or [folder] if not one.is_dir() for step in steps_of(one)]
+        files = files[::every]
         if not files:
             fail(f"{name}: there is no step with contacts")
         steps = []

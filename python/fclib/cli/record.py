@@ -28,9 +28,12 @@ def command(
     arguments: Annotated[
         list[str] | None, typer.Argument(help="Arguments of the script.", show_default=False)
     ] = None,
-    folder: Annotated[Path, typer.Option("--out", help="Folder of the problems.")] = Path(
-        "recorded"
-    ),
+    target: Annotated[
+        Path,
+        typer.Option(
+            "--out", help="Folder of the problems; a name that ends in .h5 or .hdf5: one sequence."
+        ),
+    ] = Path("recorded"),
     every: Annotated[int, typer.Option(help="Keep one step in so many.", min=1)] = 1,
     steps: Annotated[
         int | None, typer.Option(help="Steps of a deck; 100 by default.", min=1)
@@ -45,8 +48,9 @@ def command(
     """Store the problems of the steps of another simulator.
 
     The script runs as it is. Each step that is kept and has contacts becomes an FCLIB file, with
-    the engine's own reaction as a guess. A deck of LMGC90 does not say its steps: they are given
-    here.
+    the engine's own reaction as a guess; or all go into one file, a sequence. If a step cannot be
+    recorded, it is left out, and the command says why. A deck of LMGC90 does not say its steps:
+    they are given here.
     """
     from fclib import recorders
 
@@ -55,13 +59,15 @@ def command(
         recording = recorders.record_script(
             engine,
             script,
-            folder,
+            target,
             every=every,
             arguments=arguments or (),
             **{name: value for name, value in given.items() if value is not None},
         )
     except (ImportError, OSError, ValueError) as error:
         fail(str(error))
-    out.print(f"{recording.written} of {recording.seen} steps, in {folder}", highlight=False)
-    if not recording.written:
+    out.print(f"{recording.written} of {recording.seen} steps, in {target}", highlight=False)
+    if recording.without:
+        err.print(f"{script}: {recording.without}", highlight=False)
+    elif not recording.written:
         err.print(f"{script}: {recording.nothing(engine)}", highlight=False)

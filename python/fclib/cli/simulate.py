@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from fclib import collections, scenes
+from fclib._sequence import SUFFIXES
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -42,9 +43,12 @@ def command(
         ),
     ],
     steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 500,
-    folder: Annotated[Path, typer.Option("--out", help="Folder of the problems.")] = Path(
-        "problems"
-    ),
+    target: Annotated[
+        Path,
+        typer.Option(
+            "--out", help="Folder of the problems; a name that ends in .h5 or .hdf5: one sequence."
+        ),
+    ] = Path("problems"),
     time_step: Annotated[
         float | None,
         typer.Option(help="Step [s]; by default the file's own. A deck has none.", min=1e-12),
@@ -153,13 +157,18 @@ def command(
     line about each such thing; the catalogue and the description of each file have it too.
 
     The scheme is that of Moreau and Jean. The solutions are stored too. Steps without contact give
-    no problem. What is stored is a collection, which fclib collection verify and publish take.
+    no problem. What is stored is a collection, which fclib collection verify and publish take, or a
+    sequence: of the global form, or with --form local of the local one.
 
     A gap counts as closed if rounding or a small share of the motion explains it. A step is solved
     if both errors of its solution are at most the tolerance. A simulation stops if a step makes no
     sense, and says so; the steps before are stored. The exit status is then 1, as it is if a step
     was not solved.
     """
+    sequence = target if target.suffix in SUFFIXES else None
+    one_form = Form.GLOBAL if form is Form.BOTH else form
+    if sequence is not None and sequence.exists():
+        fail(f"{sequence}: is there already; name another file")
     if law not in ("velocity", "gap"):
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')
     if ctrl is not None and policy is not None:
@@ -185,7 +194,13 @@ def command(
         "--ground": ground is not None,
         "--friction": friction is not None,
     }
-    is_deck = scene.is_dir()
+    lmgc90 = None
+    if scene.is_dir():
+        try:
+            lmgc90 = deck.read(scene)
+        except (OSError, ValueError) as error:
+            fail(words_of(error))
+    is_deck = lmgc90 is not None
     for name, given in only_files.items():
         if is_deck and given:
             raise typer.BadParameter(f"{name} is not for decks: a deck says all but step and theta")
@@ -199,10 +214,10 @@ def command(
         fail(str(error))
     options = {} if merit is MeritKind.both else {"merit": merit.value}
     try:
-        if is_deck:
+        if lmgc90 is not None:
             assert time_step is not None
             loaded = deck_scene.scene_of(
-                deck.read(scene),
+                lmgc90,
                 time_step=time_step,
                 theta=0.5 if theta is None else theta,
                 period=period,
@@ -236,7 +251,7 @@ def command(
             collection="scenes",
             problems=None,
             steps=steps,
-            form=form.value,
+            form=form.value if sequence is None else one_form.value,
             count=count,
             select=select.value,
             analyze=analyze,
@@ -276,7 +291,15 @@ def command(
         err.print(f"From the keyframe {rigid.keyframe!r}", highlight=False)
     doing = f"Simulating {loaded.name}" if states is None else f"{states}: {loaded.name}"
     err.print(f"{doing}, {steps} steps ...", highlight=False)
-    build_plans([plan], folder, 1, pictures, as_json)
+    if sequence is None:
+        build_plans([plan], target, 1, pictures, as_json)
+    else:
+        build_plans([plan], parts_of(sequence), 1, False, as_json, sequence)
+
+
+def parts_of(sequence: Path) -> Path:
+    """The folder in which the problems of a sequence are made, and an interrupted build goes on."""
+    return sequence.with_name(f".{sequence.name}.parts")
 
 
 def further(activation: float) -> str:

@@ -26,7 +26,7 @@ verify.py     compares files with the catalogue, and judges solutions again
 add.py        takes existing files in as a set. Needs build.py, set_index.py, references.py
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, set_index.py
-sequence.py   consecutive problems, with guesses. Needs references.py, library.py
+sequence.py   consecutive problems, with guesses, and their file. Needs references.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
 ratings.py    which problems are easy, hard or open, by stored runs. Needs set_index.py
 
@@ -42,7 +42,7 @@ from fclib.collections.plan import Plan, Selection, Simulation, families
 from fclib.collections.published import VersionError, file_name
 from fclib.collections.record import record
 from fclib.collections.references import guess_of
-from fclib.collections.sequence import Step, sequence
+from fclib.collections.sequence import Step, sequence, write_sequence
 from fclib.collections.set_index import (
     folders,
     fresh_plan,
@@ -91,4 +91,5 @@ __all__ = [
     "sets",
     "verify",
     "version",
+    "write_sequence",
 ]

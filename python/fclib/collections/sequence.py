@@ -9,12 +9,14 @@ Contacts are linked by their names (`fclib.Contacts.identity`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fclib import _core, _sequence
 from fclib._solve import Given, Problem
+from fclib.collections.catalog import files_of
 from fclib.collections.library import Collection
 from fclib.collections.references import guess_of
 
@@ -68,6 +70,26 @@ def sequence(
             f"a sequence is of one family, and {name} has several: {', '.join(problems.folders)}"
         )
     return _steps(problems, form)
+
+
+def write_sequence(path: Path, folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
+    """Write problems of a built folder into one file, in the order of their steps.
+
+    Args:
+        path: the file.
+        folder: what was built.
+        rows: those of its catalogue, each of one form.
+
+    Raises:
+        fclib.FileError: a file cannot be read or written.
+    """
+    with _core.SequenceWriter(path) as writer:
+        for row in sorted(rows, key=lambda row: int(row["step"])):
+            (name,) = (name for name, _ in files_of(dict(row)))
+            file = folder / name
+            solution = _core.read_solution(file)
+            told = _core.read_attributes(file, "solution") if solution is not None else {}
+            writer.append(_core.read(file), solution, _core.read_guesses(file), attributes=told)
 
 
 def _recorded(steps: _sequence.Sequence) -> Iterator[Step]:

@@ -5,7 +5,7 @@
     recorded.write("step.hdf5")
 
 _assemble.py   common parts: order of rows, redundant joints, limits, dry friction, compliance
-_recorded.py   a recorded step, what is exact in it, and a folder of them
+_recorded.py   a recorded step, what is exact in it, and a folder or a sequence of them
 _criteria.py   how far a simulator's reactions are from Coulomb's law
 _scripts.py    steps of a user's script, while it runs
 _drake.py, _lmgc90.py, _mujoco.py, _newton.py, _pinocchio.py, _pybullet.py, _siconos.py
@@ -33,7 +33,7 @@ from fclib.recorders._mujoco import mujoco
 from fclib.recorders._newton import newton
 from fclib.recorders._pinocchio import pinocchio
 from fclib.recorders._pybullet import pybullet
-from fclib.recorders._recorded import Recorded, Recording
+from fclib.recorders._recorded import Recorded, Recording, SetupError
 from fclib.recorders._scripts import ENGINES, record_script
 from fclib.recorders._siconos import siconos
 
@@ -48,6 +48,7 @@ __all__ = [
     "Limits",
     "Recorded",
     "Recording",
+    "SetupError",
     "assemble",
     "associated_error",
     "criteria_of",

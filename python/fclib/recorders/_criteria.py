@@ -53,6 +53,7 @@ class Judgement:
     auto_cpu: float  # [s]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     """The criteria of reactions, by their names. V is the largest velocity without reactions.
 
@@ -71,19 +72,23 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     merit = _core.merit(problem, solution)
     u = np.reshape(_core.contact_merits(problem, solution)["u"], (-1, problem.spacedim))
     r = np.reshape(r, u.shape)
+    # of size 1, so that no square or product overflows; each criterion is relative to ||r||
+    r = r / float(np.abs(r).max(initial=0) or 1.0)
+    pace = float(np.abs(u).max(initial=0) or 1.0)
+    u = u / pace
     mu = np.asarray(problem.mu)
     normal, slip = r[:, 0], np.linalg.norm(u[:, 1:], axis=1)
     friction, bound = np.linalg.norm(r[:, 1:], axis=1), mu * np.abs(normal)
     free = problem.condense().q if hasattr(problem, "condense") else problem.q
-    fastest = np.linalg.norm(np.reshape(free, u.shape), axis=1).max(initial=0)
+    fastest = float(np.linalg.norm(np.reshape(free, u.shape), axis=1).max(initial=0) / pace)
     power = fastest * np.linalg.norm(r, axis=1).sum()
     work = np.sum(r * u, axis=1)
     missing = np.sum(r[:, 1:] * u[:, 1:], axis=1) + mu * np.maximum(normal, 0) * slip
     return {
         "error": merit.error,
-        "penetration": share(np.max(-u[:, 0], initial=0), fastest),
+        "penetration": share(float(np.max(-u[:, 0], initial=0)), fastest),
         "tension": share(np.maximum(-normal, 0).sum(), np.abs(normal).sum()),
-        "distance": share(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0), power),
+        "distance": share(float(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0)), power),
         "cone": share(np.maximum(friction - mu * np.maximum(normal, 0), 0).sum(), bound.sum()),
         "dissipation": share(np.maximum(missing, 0).sum(), fastest * bound.sum()),
         "energy": share(max(work.sum(), 0), power),
@@ -91,7 +96,9 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
 
 
 def share(part: float, whole: float) -> float:
-    """Part / whole; 0 if both are 0."""
+    """Part / whole; 0 if both are 0. If one is not a number, as after an overflow: infinity."""
+    if np.isnan(part) or np.isnan(whole):
+        return float("inf")
     return float(part / whole) if whole > 0 else float(part > 0)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from fclib import _core
 from fclib.recorders._assemble import Contacts, Limits, assemble
-from fclib.recorders._recorded import Recorded
+from fclib.recorders._recorded import Recorded, SetupError
 
 BETA, SIGMA = 1.0, 1e-3  # SAP's parameters of near rigid contacts, and of stiction
 
@@ -41,7 +41,7 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
     drakes: Any = importlib.import_module("pydrake.all")
     h = plant.time_step()
     if not h > 0:
-        raise ValueError("the plant is continuous: it has no discrete steps")
+        raise SetupError("the plant is continuous: it has no discrete steps")
     n = plant.num_velocities()
     world = plant.world_frame()
     v0 = np.array(plant.GetVelocities(context))

@@ -28,6 +28,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,7 +37,7 @@ import scipy.sparse as sp
 
 from fclib import _core
 from fclib.recorders._assemble import Assembled, Contacts, Vector
-from fclib.recorders._recorded import Origin, Recorded, Recording
+from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, SetupError, no_step
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene, polyhedron
 from fclib.scenes.shared.deck_data import RIGID, Deck, Law
@@ -113,8 +114,8 @@ def record(
 ) -> None:
     """Add the steps of a deck or a script to a recording."""
     source = Source(script, tuple(arguments), steps, time_step, theta)
-    for step in steps_of(source, recording.every):
-        recording.add(step)
+    for _, make in makers_of(source, recording.every):
+        recording.take(make)
 
 
 def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
@@ -124,6 +125,11 @@ def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
 
 def states_of(source: Source, every: int) -> Iterator[tuple[State, Recorded | None]]:
     """Each step and the state at its start; None if it is not kept, or nothing touches."""
+    return ((state, make()) for state, make in makers_of(source, every))
+
+
+def makers_of(source: Source, every: int) -> Iterator[tuple[State, Maker]]:
+    """The same, but each step is made by a call."""
     if every < 1:
         raise ValueError(f"every must be at least 1, not {every}")
     notes: tuple[str, ...] = ()
@@ -152,7 +158,8 @@ def states_of(source: Source, every: int) -> Iterator[tuple[State, Recorded | No
             if state is None or state.simulation != number:
                 state = State.start(folder / f"model-{number}.npz", number)
             following = state.after(step)
-            yield state, recorded(state, following, step, notes) if "gap" in step else None
+            kept = "gap" in step
+            yield state, partial(recorded, state, following, step, notes) if kept else no_step
             state = following
     if ran.returncode:
         raise ChildProcessError(
@@ -415,7 +422,7 @@ def recorded(
     if not nc:
         return None
     if model.law not in LAWS:
-        raise ValueError(f"the law {model.law!r} is not known: recorded are {', '.join(LAWS)}")
+        raise SetupError(f"the law {model.law!r} is not known: recorded are {', '.join(LAWS)}")
     frame = step["axes"][:, ORDER]
     centre, axes = state.halfway()
     # the candidate comes first, and N points to it

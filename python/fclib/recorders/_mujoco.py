@@ -25,7 +25,7 @@ from fclib.recorders._assemble import (
     Vector,
     assemble,
 )
-from fclib.recorders._recorded import Recorded
+from fclib.recorders._recorded import Recorded, SetupError
 
 LICENCE = "Apache-2.0"
 EXACT = 1e-8  # largest difference of the velocities of a step that is exact, relative
@@ -54,13 +54,13 @@ def record(mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None]) -> 
     }
     integrator = model.opt.integrator
     if integrator not in known:
-        raise ValueError(
+        raise SetupError(
             f"the integrator {mj.mjtIntegrator(integrator).name} is not recorded:"
             ' use <option integrator="implicitfast"/> or "Euler"'
         )
     sleep = getattr(mj.mjtEnableBit, "mjENBL_SLEEP", 0)
     if model.opt.enableflags & sleep:
-        raise ValueError(
+        raise SetupError(
             "bodies that sleep are not recorded, since no equation holds for them:"
             ' use <flag sleep="disable"/>'
         )

@@ -22,7 +22,7 @@ import numpy as np
 
 from fclib import _core
 from fclib.recorders._assemble import Contacts, DryFriction, Joints, Limits, Vector, assemble
-from fclib.recorders._recorded import Recorded
+from fclib.recorders._recorded import Recorded, SetupError
 
 VERSION: Final = "1.8"  # the version whose private data are known
 RANK: Final = 1e-5  # least size of an independent row of a joint in single precision
@@ -103,7 +103,7 @@ def recorded(step: Step, version: str) -> Recorded:
     if step.compliance is not None:
         soft = np.split(step.compliance, ends)
         if soft[3].any():
-            raise ValueError("limits of joints that yield are not recorded: limit_compliance")
+            raise SetupError("limits of joints that yield are not recorded: limit_compliance")
         compliance = soft[4]
     contacts = Contacts(
         jacobian=contact[0],
@@ -158,9 +158,9 @@ def read(kamino: Any, containers: Any, world: int) -> Step:
     """The data of a step in Kamino's solver and its contacts."""
     model, data, dual = kamino._model, kamino._data, kamino.problem_fd
     if model.device.is_capturing:
-        raise ValueError("the step is captured in a CUDA graph: record it without wp.ScopedCapture")
+        raise SetupError("the step is captured in a CUDA graph: record it without wp.ScopedCapture")
     if dual is None or kamino.config.dynamics_solver == "lox":
-        raise ValueError('the solver "lox" has no dual problem: "padmm" and "dvi" are recorded')
+        raise SetupError('the solver "lox" has no dual problem: "padmm" and "dvi" are recorded')
     if not 0 <= world < model.size.num_worlds:
         raise ValueError(f"there is no world {world}: the model has {model.size.num_worlds}")
     info, problem = model.info, dual.data
@@ -169,7 +169,7 @@ def read(kamino: Any, containers: Any, world: int) -> Step:
         return int(array.numpy()[world])
 
     if number(info.num_joint_effort_cts):
-        raise ValueError("drives of joints with a limit of effort are not recorded: effort_limit")
+        raise SetupError("drives of joints with a limit of effort are not recorded: effort_limit")
     first, last = info.bodies_offset.numpy()[world : world + 2]
     yielding, joints = number(info.num_joint_dynamic_cts), number(problem.njc)
     dry, limits, nc = number(problem.nbc), number(problem.nl), number(problem.nc)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fclib import _core
 from fclib.recorders._assemble import Contacts, assemble
-from fclib.recorders._recorded import Recorded
+from fclib.recorders._recorded import Recorded, SetupError
 
 
 def pybullet(client: int, bodies: Sequence[int] | None = None, h: float | None = None) -> Recorded:
@@ -50,7 +50,7 @@ def record(
     centre: dict[int, Any] = {}
     for body, i in place.items():
         if p.getNumJoints(body, **options):
-            raise ValueError(f"body {body}: has joints, and bodies without joints are recorded")
+            raise SetupError(f"body {body}: has joints, and bodies without joints are recorded")
         known = p.getDynamicsInfo(body, -1, **options)
         inertial = p.getBasePositionAndOrientation(body, **options)
         # PyBullet gives the frame of the inertia

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fclib import _core
+from fclib._sequence import SUFFIXES
 from fclib.recorders._assemble import Assembled, Contacts
 
 Origin = Literal["exact", "reconstructed"]
@@ -107,39 +108,78 @@ class Recorded:
 
     def write(self, path: str | Path) -> None:
         """An FCLIB file: the problem, and the engine's reaction as a guess. FileError."""
-        guesses = [] if self.guess is None else [self.guess]
-        _core.write(path, self.problem, None, guesses)
+        _core.write(path, self.problem, None, self.guesses)
+
+    @property
+    def guesses(self) -> list[_core.Solution]:
+        """The engine's reaction, if it gave one."""
+        return [] if self.guess is None else [self.guess]
+
+
+Maker = Callable[[], Recorded | None]
+
+
+def no_step() -> None:
+    """Make no step: it is not kept, or nothing touches."""
+
+
+class SetupError(ValueError):
+    """No step of this simulation can be recorded, because of its settings."""
 
 
 class Recording:
-    """A folder for recorded steps: each `every`-th step with contacts is written.
+    """A folder or a sequence for recorded steps: each `every`-th step with contacts is written.
 
     with Recording("steps", every=10) as recording:
         ...
         recording.add(recorded)
+
+    A name that ends in .h5 or .hdf5 is that of a sequence, any other one that of a folder. A step
+    that cannot be recorded, because of a flexible body or a number that is not finite, is left out,
+    and `left_out` says why.
     """
 
-    def __init__(self, folder: str | Path, every: int = 1) -> None:
+    def __init__(self, path: str | Path, every: int = 1) -> None:
         """ValueError if `every` is below 1, FileExistsError if there are files already."""
         if every < 1:
             raise ValueError(f"every must be at least 1, not {every}")
         # a script may change to another folder
-        self.folder, self.every = Path(folder).absolute(), every
+        self.path, self.every = Path(path).absolute(), every
         self.seen = self.written = 0
-        if self.folder.is_dir() and any(self.folder.glob("*.hdf5")):
-            raise FileExistsError(f"{self.folder}: has files already; name another folder")
+        self.left_out: list[tuple[int, str]] = []  # number of the step, and the reason
+        self._sequence: _core.SequenceWriter | None = None
+        if self.path.is_file() or (self.path.is_dir() and any(self.path.glob("*.hdf5"))):
+            kind = "file" if self.path.is_file() else "folder"
+            raise FileExistsError(f"{self.path}: has steps already; name another {kind}")
 
     def __enter__(self) -> Recording:
         return self
 
     def __exit__(self, *_: object) -> None:
-        return None
+        self.close()
+
+    def close(self) -> None:
+        """End a sequence. FileError if it cannot be written."""
+        if self._sequence is not None:
+            self._sequence.close()
 
     def nothing(self, engine: str) -> str:
         """Why no step was written, in words."""
         if not self.seen:
             return f"it took no step of {engine} of the kind that is recorded"
+        if self.left_out:
+            return self.without
         return f"of {self.seen} steps, none that was kept has a contact between points"
+
+    @property
+    def without(self) -> str:
+        """What was left out, in words; empty if nothing was."""
+        if not self.left_out:
+            return ""
+        number, why = self.left_out[0]
+        count = len(self.left_out)
+        more = f", and {count - 1} more" if count > 1 else ""
+        return f"left out of {self.seen} steps: number {number}{more}. Of number {number}: {why}"
 
     @property
     def wanted(self) -> bool:
@@ -148,10 +188,35 @@ class Recording:
 
     def add(self, recorded: Recorded | None) -> None:
         """Count a step, and write it if it is to be kept and something touches."""
+        self.take(lambda: recorded)
+
+    def take(self, make: Maker) -> None:
+        """The same of a step that is made only if it is to be kept.
+
+        Raises:
+            SetupError: no step can be recorded.
+            FileError: it cannot be written.
+        """
         number, kept = self.seen, self.wanted
         self.seen += 1
-        if not kept or recorded is None or not recorded.assembled.problem.nc:
+        if not kept:
             return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        recorded.write(self.folder / f"{recorded.engine.lower()}-{number:06d}.hdf5")
-        self.written += 1
+        try:
+            recorded = make()
+            if recorded is not None and recorded.assembled.problem.nc:
+                self._write(number, recorded)
+                self.written += 1
+        except SetupError:
+            raise
+        except ValueError as error:  # np.linalg.LinAlgError and ProblemError are such
+            self.left_out.append((number, str(error)))
+
+    def _write(self, number: int, recorded: Recorded) -> None:
+        if self.path.suffix not in SUFFIXES:
+            self.path.mkdir(parents=True, exist_ok=True)
+            recorded.write(self.path / f"{recorded.engine.lower()}-{number:06d}.hdf5")
+            return
+        if self._sequence is None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._sequence = _core.SequenceWriter(self.path)
+        self._sequence.append(recorded.problem, None, recorded.guesses)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import os
 import runpy
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,15 +23,14 @@ def _steps_of_pybullet(recording: Recording) -> Iterator[None]:
     original = p.stepSimulation
 
     def step(physicsClientId: int = 0) -> Any:
-        if not recording.wanted:
-            recording.add(None)
-            return original(physicsClientId=physicsClientId)
         result: list[Any] = []
 
         def once(**options: Any) -> None:
             result.append(original(**options))
 
-        recording.add(_pybullet.record(p, physicsClientId, None, None, once))
+        recording.take(lambda: _pybullet.record(p, physicsClientId, None, None, once))
+        if not result:  # the step was not kept, or is left out
+            once(physicsClientId=physicsClientId)
         return result[0]
 
     p.stepSimulation = step
@@ -46,10 +47,14 @@ def _steps_of_mujoco(recording: Recording) -> Iterator[None]:
 
     def step(m: Any, d: Any, nstep: int = 1) -> None:
         for _ in range(nstep):
-            if recording.wanted:
-                recording.add(_mujoco.record(mj, m, d, original))
-            else:
-                recording.add(None)
+            taken: list[bool] = []
+
+            def once(m: Any, d: Any, taken: list[bool] = taken) -> None:
+                original(m, d)
+                taken.append(True)
+
+            recording.take(partial(_mujoco.record, mj, m, d, once))
+            if not taken:  # the step was not kept, or is left out
                 original(m, d)
 
     mj.mj_step = step
@@ -78,8 +83,7 @@ def _steps_of_drake(recording: Recording) -> Iterator[None]:
             if plant is not None and root.get_time() != last[0]:
                 last[0] = root.get_time()
                 context = plant.GetMyContextFromRoot(root)
-                wanted = recording.wanted
-                recording.add(_drake.drake(plant, context) if wanted else None)
+                recording.take(partial(_drake.drake, plant, context))
             return drakes.EventStatus.DidNothing()
 
         self.set_monitor(monitor)
@@ -103,7 +107,7 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
 
     def step(self: Any, *arguments: Any, **options: Any) -> Any:
         result = original(self, *arguments, **options)
-        recording.add(_newton.newton(self) if recording.wanted else None)
+        recording.take(partial(_newton.newton, self))
         return result
 
     kind.step = step
@@ -111,6 +115,23 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
         yield
     finally:
         kind.step = original
+
+
+@contextmanager
+def _closed_at_exit(recording: Recording) -> Iterator[None]:
+    """Close the recording also if the script ends the process at once."""
+    original, own = os._exit, os.getpid()
+
+    def end(status: int) -> None:
+        if os.getpid() == own:  # a process that the script has made writes nothing
+            recording.close()
+        original(status)
+
+    os._exit = end  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        os._exit = original
 
 
 def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequence[str]], None]:
@@ -121,7 +142,7 @@ def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequ
         sys.argv = [str(script), *arguments]
         sys.path.insert(0, str(script.parent))
         try:
-            with steps(recording):
+            with steps(recording), _closed_at_exit(recording):
                 runpy.run_path(str(script), run_name="__main__")
         except SystemExit as end:
             if end.code not in (None, 0):
@@ -164,7 +185,7 @@ ENGINES: Final[dict[str, Callable[..., None]]] = {
 def record_script(
     engine: str,
     script: str | Path,
-    folder: str | Path,
+    out: str | Path,
     *,
     every: int = 1,
     arguments: Sequence[str] = (),
@@ -172,13 +193,15 @@ def record_script(
 ) -> Recording:
     """Run a script, and write each `every`-th step of its engine that has contacts.
 
-    For LMGC90 the script may be the folder of a deck; `deck` has its steps, time_step and theta,
-    as `fclib.recorders.lmgc90` takes them.
+    `out` is a folder, or a sequence if its name ends in .h5 or .hdf5: see `Recording`. For LMGC90
+    the script may be the folder of a deck; `deck` has its steps, time_step and theta, as
+    `fclib.recorders.lmgc90` takes them.
 
     Raises:
-        ValueError: the engine is not one of `ENGINES`, or `every` is below 1; a deck is wrong.
+        ValueError: the engine is not one of `ENGINES`, or `every` is below 1; a deck is wrong, or
+            no step of the simulation can be recorded.
         ImportError: the engine is not installed.
-        OSError: the script cannot be read, or the folder not written; it may hold no files.
+        OSError: the script cannot be read, or the steps not written; there may be none before.
         ChildProcessError: Siconos or LMGC90 ended with an error; steps before it are written.
     """
     if engine not in ENGINES:
@@ -189,6 +212,6 @@ def record_script(
         raise FileNotFoundError(f"{script}: there is no such script")
     if deck and not is_deck:
         raise ValueError(f"{', '.join(deck)}: only for the folder of a deck of LMGC90")
-    recording = Recording(folder, every)
-    ENGINES[engine](recording, script, arguments, **deck)
+    with Recording(out, every) as recording:
+        ENGINES[engine](recording, script, arguments, **deck)
     return recording

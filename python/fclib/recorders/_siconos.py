@@ -15,6 +15,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ import scipy.sparse as sp
 from fclib import _core
 from fclib.external import siconos as installed
 from fclib.recorders._assemble import Assembled, Contacts
-from fclib.recorders._recorded import Origin, Recorded, Recording
+from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, no_step
 
 STEPS = Path(__file__).with_name("_siconos_steps.py")
 
@@ -42,17 +43,18 @@ def siconos(
         ChildProcessError: the script ended with an error; raised after the steps before it.
         ValueError: `every` is below 1.
     """
-    return (step for step in steps(Path(script), arguments, every) if step is not None)
+    made = (make() for make in steps(Path(script), arguments, every))
+    return (step for step in made if step is not None)
 
 
 def record(recording: Recording, script: Path, arguments: Sequence[str]) -> None:
     """Add the steps of a script to a recording."""
-    for step in steps(script, arguments, recording.every):
-        recording.add(step)
+    for make in steps(script, arguments, recording.every):
+        recording.take(make)
 
 
-def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Recorded | None]:
-    """Each step of a script; None if it is not kept, or nothing touches."""
+def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Maker]:
+    """What makes each step of a script; it makes None if it is not kept, or nothing touches."""
     if every < 1:
         raise ValueError(f"every must be at least 1, not {every}")
     if not script.is_file():
@@ -68,7 +70,7 @@ def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Record
             told = json.loads(end.read_text(encoding="utf-8"))
         for number in range(told["steps"]):
             file = Path(folder) / f"{number:06d}.npz"
-            yield recorded(file, told["version"]) if file.is_file() else None
+            yield partial(recorded, file, told["version"]) if file.is_file() else no_step
     if status:
         raise ChildProcessError(
             f"{script}: ended with status {status} in {installed.python()}; what it said is above"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from fclib._regular import regular
 from fclib.simulate.simulation import Control, State
 
 FILES = (".csv", ".npy")
@@ -42,9 +43,11 @@ def read_rows(path: Path) -> np.ndarray:
     """The table (steps x nu) of a file: one line for each step. Raises OSError, ValueError."""
     try:
         if path.suffix == ".npy":
-            rows = np.atleast_2d(np.asarray(np.load(path, allow_pickle=False), dtype=float))
+            rows = np.atleast_2d(
+                np.asarray(np.load(regular(path), allow_pickle=False), dtype=float)
+            )
         else:
-            lines = path.read_text(encoding="utf-8").splitlines()
+            lines = regular(path).read_text(encoding="utf-8").splitlines()
             lines = [line for line in lines if line.partition("#")[0].strip()]
             rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, 0))
     except (ValueError, EOFError) as error:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fclib._regular import regular
 from fclib.simulate.arrays import Vector
 from fclib.simulate.mujoco_model import MujocoModel
 
@@ -61,7 +62,7 @@ def logged(path: Path, model: MujocoModel) -> tuple[Vector, Vector]:
 def of_arrays(path: Path) -> dict[str, Vector]:
     """The arrays of an .npz file. Raises OSError, ValueError."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with np.load(regular(path), allow_pickle=False) as arrays:
             return {
                 name: np.atleast_2d(np.asarray(arrays[name], dtype=float))
                 for name in (*NEEDED, *OPTIONAL)
@@ -73,7 +74,7 @@ def of_arrays(path: Path) -> dict[str, Vector]:
 
 def of_columns(path: Path) -> dict[str, Vector]:
     """The columns of a .csv file. Raises OSError, ValueError."""
-    with path.open(encoding="utf-8", newline="") as file:
+    with regular(path).open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
     names = [name.strip() for name in rows[0]] if rows else []
     found: dict[str, list[tuple[int, int]]] = {}

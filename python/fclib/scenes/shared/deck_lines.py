@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
+from fclib._regular import regular
+
 _PAIR = re.compile(r"([A-Za-z_]\w*(?:\(\d\))?)\s*[=:]\s*(\S+)")
 
 
@@ -89,7 +91,7 @@ class Lines:
     """The lines of a file, after its heading, without comments."""
 
     def __init__(self, path: Path) -> None:
-        content = path.read_bytes()
+        content = regular(path).read_bytes()
         self.path, self.sha256 = path, hashlib.sha256(content).hexdigest()
         self.lines = []
         inside = False

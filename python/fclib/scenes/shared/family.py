@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
+from fclib._regular import regular
 from fclib.scenes.shared import siconos_input, siconos_scene
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
@@ -139,7 +140,7 @@ class Scene:
                 or lacks its time step or friction.
             ImportError: it refers to files, and MuJoCo is missing; or h5py is, for a file of HDF5.
         """
-        path = Path(path)
+        path = regular(path)
         if path.suffix == siconos_input.SUFFIX:
             return cls._of_siconos(path, time_step, friction, restitution, law, activation)
         if friction is not None:

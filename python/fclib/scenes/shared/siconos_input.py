@@ -23,6 +23,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from fclib._regular import regular
 from fclib.scenes.shared import mjcf
 
 Vector = npt.NDArray[np.float64]
@@ -197,7 +198,7 @@ def centre_of(points: Vector) -> Vector:
 
 def points_of(path: Path) -> Vector:
     """(k x 3) the points of a .vtp file. OSError, ValueError."""
-    return points_in(path.read_bytes(), str(path))
+    return points_in(regular(path).read_bytes(), str(path))
 
 
 def points_in(text: bytes, what: str) -> Vector:

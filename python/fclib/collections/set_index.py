@@ -63,7 +63,7 @@ SETS: dict[str, tuple[str, str]] = {
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
     *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "decks", "rr9118"),
-    *("fclib2024", "quasistatic", "laws", "assembly", "flows"),
+    *("fclib2024", "spin", "quasistatic", "laws", "assembly", "flows"),
 )
 
 

@@ -177,7 +177,7 @@ val describe_structs() {
     problems.set(std::string(P::kind), one);
   });
   val statuses = val::array();
-  for (int k = 0; k <= static_cast<int>(Status::infeasible); ++k) {
+  for (int k = 0; k < static_cast<int>(status_count); ++k) {
     statuses.call<void>("push", to_js(fclib::name_of(static_cast<Status>(k))));
   }
   val storages = val::array();

@@ -412,7 +412,8 @@ enum fclib_status {
   FCLIB_INACCURATE,      /**< the solver said it was done, but MERIT_2 is above the tolerance */
   FCLIB_INTERRUPTED,
   FCLIB_STALLED,   /**< the solver has nothing left to try; its best iterate is returned */
-  FCLIB_INFEASIBLE /**< there is no solution, and the solver has proven it */
+  FCLIB_INFEASIBLE, /**< there is no solution, and the solver has proven it */
+  FCLIB_INVALID     /**< of a problem in a batch: its data are not valid */
 };
 
 /** New. The results of a solve besides the solution. */
@@ -743,16 +744,16 @@ int fclib_sequence_size(const char* path);
 
 /* ---- many small problems --------------------------------------------------------------------- */
 
-/** New. Local problems of a few contacts, one after another in the caller's arrays. Later versions
- *  may add members at the end: set the struct to zeros first, and `size` to sizeof(struct
- *  fclib_batch). */
+/** New. Problems of a few contacts, one after another in the caller's arrays: local ones, u = W r +
+ *  q, or global ones, M v = H r + f and u = H^T v + w. Later versions may add members at the end:
+ *  set the struct to zeros first, and `size` to sizeof(struct fclib_batch). */
 struct fclib_batch {
   size_t size;
   int spacedim;        /**< 2 or 3 */
   int count;           /**< problems */
   const int* nc;       /**< contacts of each (count), or NULL: nc_each */
   int nc_each;         /**< contacts of every problem, if nc is NULL */
-  const double* W;     /**< of each problem m x m by rows, m = spacedim nc */
+  const double* W;     /**< of each problem m x m by rows, m = spacedim nc; or blocks, see starts */
   const double* q;     /**< of each m */
   const double* mu;    /**< of each nc */
   const double* guess; /**< reactions to start from, of each m, or NULL */
@@ -764,15 +765,65 @@ struct fclib_batch {
   double* r;                 /**< of each m */
   double* u;                 /**< of each m: W r + q */
   enum fclib_status* status; /**< (count) */
-  double* error;             /**< (count) MERIT_2 */
+  double* error;             /**< (count) at least MERIT_2, and at most a thousandth of the
+                                  tolerance above it */
   int* iterations;           /**< (count) */
+  /* W by blocks of spacedim x spacedim, each by rows, if starts is not NULL: row of blocks by row of
+     blocks. Contacts that no block connects are solved apart from each other. */
+  const int* starts;  /**< of each nc + 1: the first block of each contact, and their number */
+  const int* columns; /**< of each block the other contact */
+  int one_pattern;    /**< not 0: starts and columns are there once, for all problems */
+  /* global problems, if M is not NULL: W and q are then NULL */
+  const int* n;    /**< degrees of freedom of each (count), or NULL: n_each */
+  int n_each;      /**< ... of every problem, if n is NULL */
+  const double* M; /**< of each n x n, symmetric */
+  const double* H; /**< of each n x m by columns, which is the Jacobian H^T by rows */
+  const double* f; /**< of each n */
+  const double* w_free; /**< w, of each m, or NULL for zeros */
+  double* v;            /**< result: of each n; may be NULL */
 };
 
 /** New. Solves all problems of a batch. Small ones have a method of their own, which allocates
  *  nothing once its thread has seen the largest problem. The solver "auto" gets those that this
- *  method does not solve. Returns 1 if all were tried, however they ended. Returns 0 for invalid
- *  data; the message names the problem, and the other problems have their answers all the same. */
+ *  method does not solve. Returns 1 if all were tried, however they ended. A problem with an entry
+ *  that is not finite, a negative mu, or an M that is not positive definite has the status
+ *  FCLIB_INVALID, and NaN for r, u and v; the others have their answers all the same. If status is
+ *  NULL, such a problem makes the call return 0, with a message that names it. */
 int fclib_solve_batch(const struct fclib_batch* batch);
+
+/** New. How the solutions of a batch of local problems change with their data. Set the struct to
+ *  zeros first, and `size` to sizeof(struct fclib_derivatives). */
+struct fclib_derivatives {
+  size_t size;
+  int spacedim;     /**< 2 or 3 */
+  int count;        /**< problems */
+  const int* nc;    /**< contacts of each (count), or NULL: nc_each */
+  int nc_each;      /**< contacts of every problem, if nc is NULL */
+  const double* W;  /**< of each problem m x m by rows, m = spacedim nc */
+  const double* q;  /**< of each m */
+  const double* mu; /**< of each nc */
+  const double* r;  /**< of each m: the solutions, to a tolerance far below 1e-6 */
+  int threads;      /**< as in fclib_batch */
+  int sides;        /**< right-hand sides of each problem, one after another; 0 for 1 */
+  /* fclib_batch_jvp reads the changes of the data and fills those of the solution; fclib_batch_vjp
+     reads the weights of r and u and fills the derivatives of their sum by the data. What is NULL
+     is zero, or not asked for. */
+  double* dW;  /**< of each, sides times m x m by rows; its entries count as independent */
+  double* dq;  /**< of each, sides times m */
+  double* dmu; /**< of each, sides times nc */
+  double* dr;  /**< of each, sides times m */
+  double* du;  /**< of each, sides times m */
+  unsigned char* degenerate; /**< result: of each nc, or NULL: 1 if the contact is on a border
+                                  between two statuses, where one of two derivatives is taken */
+  unsigned char* unique;     /**< result: (count), or NULL: 0 if the change of r is not determined;
+                                  the least one is given */
+};
+
+/** New. Derivatives in adjoint mode, and in forward mode. One factorisation serves all sides of a
+ *  problem. A problem with data that are not valid gets NaN, but zero weights or changes give zeros.
+ *  Return 1, and 0 for sizes that make no sense. */
+int fclib_batch_vjp(const struct fclib_derivatives* derivatives);
+int fclib_batch_jvp(const struct fclib_derivatives* derivatives);
 
 /* ---- one solve after another ----------------------------------------------------------------- */
 

@@ -1,4 +1,5 @@
-// fclib_solve_batch: the arrays are the caller's, nothing is copied.
+// fclib_solve_batch, fclib_batch_vjp, fclib_batch_jvp: the arrays are the caller's, nothing is
+// copied.
 #include "embed/batch.hpp"
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 
 #include "capi/errors.hpp"
 #include "capi/status.hpp"
+#include "embed/derivatives.hpp"
 
 namespace fclib::c {
 
@@ -24,9 +26,16 @@ std::array<std::int32_t, status_count> codes() {
   return result;
 }
 
+/// -1 in C: as many as the machine has.
+int threads_of(int threads) {
+  if (threads < -1) fail("threads", "must be -1 or more");
+  return threads == -1 ? 0 : std::max(threads, 1);
+}
+
 int solve(const fclib_batch* given_batch) {
   return guarded(0, [&] {
     const std::size_t size = given(given_batch, "batch").size;
+    // the members of the first version
     if (size < offsetof(fclib_batch, iterations) + sizeof(int*)) {
       fail("batch->size", "is " + std::to_string(size) + ", expected sizeof(struct fclib_batch)");
     }
@@ -43,8 +52,31 @@ int solve(const fclib_batch* given_batch) {
       if (any) given(array, name);
       return array;
     };
-    batch.W = need(c.W, "batch->W");
-    batch.q = need(c.q, "batch->q");
+    if (c.M != nullptr) {
+      if (c.W != nullptr) fail("batch->W", "must be NULL if M is given");
+      batch.M = c.M;
+      batch.n = c.n;
+      batch.n_each = c.n_each;
+      batch.H = need(c.H, "batch->H");
+      batch.f = need(c.f, "batch->f");
+      batch.w = c.w_free;
+      batch.v = c.v;
+    } else {
+      batch.q = need(c.q, "batch->q");
+      batch.starts = c.starts;
+      batch.one_pattern = c.one_pattern != 0;
+      batch.columns = c.columns;
+      batch.W = c.W;
+      if (c.starts == nullptr) {
+        need(c.W, "batch->W");
+      } else if (c.count > 0) {
+        const auto nc = static_cast<std::ptrdiff_t>(c.nc != nullptr ? c.nc[0] : c.nc_each);
+        if (nc >= 0 && c.starts[nc] > 0) {
+          given(c.columns, "batch->columns");
+          given(c.W, "batch->W");
+        }
+      }
+    }
     batch.mu = need(c.mu, "batch->mu");
     batch.guess = c.guess;
     batch.r = need(c.r, "batch->r");
@@ -55,12 +87,57 @@ int solve(const fclib_batch* given_batch) {
     batch.iterations = c.iterations;
     if (!(c.tolerance >= 0)) fail("batch->tolerance", "must not be negative");
     if (!(c.time_limit >= 0)) fail("batch->time_limit", "must not be negative");
-    if (c.threads < -1) fail("batch->threads", "must be -1 or more");
     BatchSettings settings;
     if (c.tolerance > 0) settings.tolerance = c.tolerance;
     if (c.time_limit > 0) settings.time_limit = c.time_limit;
-    settings.threads = c.threads == -1 ? 0 : std::max(c.threads, 1);
-    solve_batch(batch, settings);
+    settings.threads = threads_of(c.threads);
+    const BatchOutcome outcome = solve_batch(batch, settings);
+    if (outcome.invalid > 0 && c.status == nullptr) {
+      fail("problem " + std::to_string(outcome.first_invalid), outcome.wrong);
+    }
+    return 1;
+  });
+}
+
+SolvedBatch solved(const fclib_derivatives& c) {
+  if (c.count < 0) fail("derivatives->count", "must not be negative");
+  if (c.sides < 0) fail("derivatives->sides", "must not be negative");
+  SolvedBatch batch;
+  batch.spacedim = c.spacedim;
+  batch.count = c.count;
+  batch.nc = c.nc;
+  batch.nc_each = c.nc_each;
+  const bool any = c.count > 0 && (c.nc != nullptr || c.nc_each > 0);
+  const auto need = [&](auto* array, const char* name) {
+    if (any) given(array, name);
+    return array;
+  };
+  batch.W = need(c.W, "derivatives->W");
+  batch.q = need(c.q, "derivatives->q");
+  batch.mu = need(c.mu, "derivatives->mu");
+  batch.r = need(c.r, "derivatives->r");
+  batch.degenerate = c.degenerate;
+  batch.unique = c.unique;
+  return batch;
+}
+
+int differentiate(const fclib_derivatives* given_derivatives, bool backwards) {
+  return guarded(0, [&] {
+    const std::size_t size = given(given_derivatives, "derivatives").size;
+    if (size < offsetof(fclib_derivatives, unique) + sizeof(unsigned char*)) {
+      fail("derivatives->size",
+           "is " + std::to_string(size) + ", expected sizeof(struct fclib_derivatives)");
+    }
+    fclib_derivatives c{};
+    std::memcpy(&c, given_derivatives, std::min(size, sizeof c));
+    const SolvedBatch batch = solved(c);
+    const std::int64_t sides = c.sides > 0 ? c.sides : 1;
+    const DerivativeSettings settings{.threads = threads_of(c.threads)};
+    if (backwards) {
+      adjoint(batch, {sides, c.dr, c.du, c.dW, c.dq, c.dmu}, settings);
+    } else {
+      forward(batch, {sides, c.dW, c.dq, c.dmu, c.dr, c.du}, settings);
+    }
     return 1;
   });
 }
@@ -70,3 +147,11 @@ int solve(const fclib_batch* given_batch) {
 }  // namespace fclib::c
 
 extern "C" int fclib_solve_batch(const fclib_batch* batch) { return fclib::c::solve(batch); }
+
+extern "C" int fclib_batch_vjp(const fclib_derivatives* derivatives) {
+  return fclib::c::differentiate(derivatives, true);
+}
+
+extern "C" int fclib_batch_jvp(const fclib_derivatives* derivatives) {
+  return fclib::c::differentiate(derivatives, false);
+}

@@ -121,9 +121,8 @@ const char* fclib_solver_name(int k) {
 
 const char* fclib_status_name(fclib_status status) {
   const int number = number_of(status);
-  for (const Status candidate :
-       {Status::converged, Status::iteration_limit, Status::time_limit, Status::diverged,
-        Status::inaccurate, Status::interrupted, Status::stalled, Status::infeasible}) {
+  for (std::size_t k = 0; k < status_count; ++k) {
+    const auto candidate = static_cast<Status>(k);
     if (status_in_c(candidate) == number) return name_of(candidate).data();  // a string literal
   }
   return "unknown";

@@ -6,8 +6,6 @@
 
 namespace fclib::c {
 
-inline constexpr std::size_t status_count = static_cast<std::size_t>(Status::infeasible) + 1;
-
 inline fclib_status status_in_c(Status status) {
   switch (status) {
     case Status::converged:
@@ -26,6 +24,8 @@ inline fclib_status status_in_c(Status status) {
       return FCLIB_STALLED;
     case Status::infeasible:
       return FCLIB_INFEASIBLE;
+    case Status::invalid:
+      return FCLIB_INVALID;
   }
   return FCLIB_DIVERGED;
 }

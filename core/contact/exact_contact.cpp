@@ -55,8 +55,8 @@ void ExactContact<D>::reveal_rank(const Mat& a) {
 }
 
 template <int D>
-bool ExactContact<D>::solve_singular(const Vec& b, const TangentVec& c, double free_normal,
-                                     Vec& r) {
+bool ExactContact<D>::solve_singular(const Vec& b, const TangentVec& c, double free_normal, Vec& r,
+                                     double close) {
   TangentVec within = range_ * c;
   const TangentVec across = c - within;
   const double terms = b.template tail<T>().norm() + to_tangent_.norm() * std::abs(b[0]);
@@ -73,7 +73,7 @@ bool ExactContact<D>::solve_singular(const Vec& b, const TangentVec& c, double f
   }
   if (free) within = c;
   Vec slides = r;
-  const bool slips = within.squaredNorm() > 0 && slip(within, free_normal, slides);
+  const bool slips = within.squaredNorm() > 0 && slip(within, free_normal, slides, close);
   if (!sticks && !slips) return false;
   const Vec& best = !slips || (sticks && !(left(b, slides) < left(b, stick))) ? stick : slides;
   if (!(left(b, best) <= left(b, r))) return false;

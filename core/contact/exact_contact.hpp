@@ -39,8 +39,9 @@ class ExactContact {
   ExactContact(const Mat& a, double mu);
 
   /// Replaces r by an exact solution. Returns false, and leaves r untouched, if none is found: the
-  /// block has no normal part, or with this coupling and mu the slip equation has no root.
-  bool solve(const Vec& b, Vec& r) {
+  /// block has no normal part, or with this coupling and mu the slip equation has no root. Sliding
+  /// reactions may be as far from the solution as `close`.
+  bool solve(const Vec& b, Vec& r, double close = 0) {
     if (b[0] >= 0) {
       r.setZero();
       return true;
@@ -48,7 +49,7 @@ class ExactContact {
     if (!solvable_) return false;
     const TangentVec c = b.template tail<T>() - to_tangent_ * b[0];
     const double free_normal = -b[0] / normal_;  // r_N if r_T = 0
-    if (singular_ && mu_ != 0) return solve_singular(b, c, free_normal, r);
+    if (singular_ && mu_ != 0) return solve_singular(b, c, free_normal, r, close);
 
     if (mu_ == 0) {
       r.setZero();
@@ -64,7 +65,7 @@ class ExactContact {
         return true;
       }
     }
-    return slip(c, free_normal, r);
+    return slip(c, free_normal, r, close);
   }
 
  private:
@@ -78,7 +79,7 @@ class ExactContact {
   void reveal_rank(const Mat& a);
 
   /// Like solve(), if S is singular, b_N < 0 and mu > 0.
-  bool solve_singular(const Vec& b, const TangentVec& c, double free_normal, Vec& r);
+  bool solve_singular(const Vec& b, const TangentVec& c, double free_normal, Vec& r, double close);
 
   /// The natural map of this contact alone.
   [[nodiscard]] double left(const Vec& b, const Vec& r) const;
@@ -103,7 +104,7 @@ class ExactContact {
     return inverse;
   }
 
-  bool slip(const TangentVec& c, double free_normal, Vec& r) {
+  bool slip(const TangentVec& c, double free_normal, Vec& r, double close) {
     if constexpr (T == 1) {
       // |r_T| = mu r_N against the sliding, which has the sign of c
       const double direction = c[0] > 0 ? -1.0 : 1.0;
@@ -127,7 +128,7 @@ class ExactContact {
         rn = free_normal - to_normal_.dot(rt);
         norm = rt.norm();
         const double h = mu_ * rn / norm - 1.0;
-        if (last || std::abs(h) <= 1e-15) break;
+        if (last || std::abs(h) <= 1e-15 || std::abs(h) * norm <= close) break;
         (h > 0 ? high : low) = alpha;
         const TangentVec slope = -(inverse * rt);  // d r_T / d alpha
         const double h_slope =

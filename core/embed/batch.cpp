@@ -8,12 +8,12 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "embed/body_form.hpp"
 #include "embed/small_solver.hpp"
-#include "linalg/extended.hpp"
 #include "linalg/workers.hpp"
-#include "merit/natural_sums.hpp"
 #include "solve/driver.hpp"
 
 namespace fclib {
@@ -22,7 +22,7 @@ namespace {
 
 /// The number of problems that a thread takes at once.
 constexpr std::int64_t chunk = 32;
-/// Larger ones are for `auto`: the small solver is dense, `auto` is not.
+/// If an island is larger, the problem is for `auto`: the small solver is dense, `auto` is not.
 constexpr Index most_contacts = 64;
 constexpr double poll_interval = 0.1;  // [s]
 
@@ -31,16 +31,28 @@ struct Place {
   std::int64_t W = 0;
   std::int64_t q = 0;
   std::int64_t mu = 0;
+  std::int64_t starts = 0;
+  std::int64_t columns = 0;
+  std::int64_t M = 0;
+  std::int64_t H = 0;
+  std::int64_t f = 0;
 };
 
 struct One {
   Index nc;
   const double* W;
   const double* q;
+  BlockView blocks;
+  Index n;
+  const double* M;
+  const double* H;
+  const double* f;
+  const double* w;
   const double* mu;
   const double* guess;
   double* r;
   double* u;
+  double* v;
 };
 
 bool all_finite(const double* x, std::int64_t size) {
@@ -49,58 +61,17 @@ bool all_finite(const double* x, std::int64_t size) {
   return sum == 0;
 }
 
-/// u = W r + q, and the merit of r, both in extended precision.
-template <int D>
-double judge(const One& one) {
-  using std::abs, std::sqrt;  // or those of Real
-  using Vec = ContactVector<D, Real>;
-  NaturalSums<Coulomb<D, Real>> sums;
-  const auto m = static_cast<std::int64_t>(D) * one.nc;
-  const auto size_of = [&](Index a) {
-    Real size = 0;
-    for (std::int64_t k = D * a; k < D * (a + 1); ++k) size += abs(Real(one.W[k * m + k])) / D;
-    return size;
-  };
-  ContactScales<Real> scales;
-  Real squares = 0;
-  for (Index a = 0; a < one.nc; ++a) scales.add(size_of(a));
-  for (std::int64_t k = 0; k < m; ++k) squares += full_product(one.q[k], one.q[k]);
-  const Real mean = sqrt(squares / one.nc);
-  for (Index a = 0; a < one.nc; ++a) {
-    Vec u;
-    Vec q;
-    Vec r;
-    for (int k = 0; k < D; ++k) {
-      const std::int64_t at = D * a + k;
-      const double* row = one.W + at * m;
-      Real sum = 0;
-      for (std::int64_t j = 0; j < m; ++j) sum += full_product(row[j], one.r[j]);
-      sum += one.q[at];
-      u[k] = sum;
-      q[k] = one.q[at];
-      r[k] = one.r[at];
-      if (one.u != nullptr) one.u[at] = static_cast<double>(sum);
-    }
-    const Real rho = scales.rho(size_of(a));
-    const Coulomb<D, Real> cone(one.mu[a]);
-    const Real q_square = q.squaredNorm();
-    const Real slip = slip_of_rounding<Real>(sqrt(q_square), mean);
-    sums.add(cone, u, r, q_square, Real(0), rho, {slip});
-  }
-  return sums.error();
-}
-
 template <int D>
 class Runner {
  public:
   Runner(const Batch& batch, const BatchSettings& settings)
       : batch_(batch), settings_(settings), deadline_(settings.time_limit) {
-    if (batch.nc == nullptr) return;
+    if (!varies()) return;
     Place place;
-    starts_.reserve(static_cast<std::size_t>((batch.count + chunk - 1) / chunk));
+    starts_.reserve(static_cast<std::size_t>(batch.count / chunk + 1));
     for (std::int64_t k = 0; k < batch.count; ++k) {
       if (k % chunk == 0) starts_.push_back(place);
-      advance(place, batch.nc[k]);
+      advance(place, k);
     }
   }
 
@@ -117,57 +88,109 @@ class Runner {
       workers.run([&](int worker) { work(worker == 0); });
     }
     if (failure_) std::rethrow_exception(failure_);
-    return {converged_, by_auto_};
+    return outcome_;
   }
 
  private:
-  static void advance(Place& place, std::int64_t nc) {
-    place.W += D * nc * D * nc;
-    place.q += D * nc;
-    place.mu += nc;
+  /// Whether problems differ in size.
+  [[nodiscard]] bool varies() const {
+    return batch_.nc != nullptr || (batch_.M != nullptr && batch_.n != nullptr) ||
+           (batch_.starts != nullptr && !batch_.one_pattern);
   }
 
   [[nodiscard]] Index contacts(std::int64_t k) const {
     return batch_.nc == nullptr ? batch_.nc_each : batch_.nc[k];
   }
+  [[nodiscard]] Index freedoms(std::int64_t k) const {
+    if (batch_.M == nullptr) return 0;
+    return batch_.n == nullptr ? batch_.n_each : batch_.n[k];
+  }
+
+  /// From problem k to the next.
+  void advance(Place& place, std::int64_t k) const {
+    const std::int64_t nc = contacts(k);
+    const std::int64_t n = freedoms(k);
+    const std::int64_t m = D * nc;
+    if (batch_.starts == nullptr) {
+      place.W += m * m;
+    } else {
+      const std::int64_t blocks = batch_.starts[place.starts + nc];
+      place.W += D * D * blocks;
+      if (!batch_.one_pattern) {
+        place.starts += nc + 1;
+        place.columns += blocks;
+      }
+    }
+    place.q += m;
+    place.mu += nc;
+    place.M += n * n;
+    place.H += n * m;
+    place.f += n;
+  }
 
   [[nodiscard]] One one(std::int64_t k, const Place& place) const {
-    const auto or_null = [&](auto* array) { return array == nullptr ? nullptr : array + place.q; };
-    return {contacts(k),           batch_.W + place.W, batch_.q + place.q, batch_.mu + place.mu,
-            or_null(batch_.guess), batch_.r + place.q, or_null(batch_.u)};
+    const auto at = [](auto* array, std::int64_t by) {
+      return array == nullptr ? nullptr : array + by;
+    };
+    One result{};
+    result.nc = contacts(k);
+    result.n = freedoms(k);
+    result.W = at(batch_.W, place.W);
+    result.q = at(batch_.q, place.q);
+    if (batch_.starts != nullptr) {
+      result.blocks = {batch_.starts + place.starts, at(batch_.columns, place.columns), result.W};
+    }
+    result.M = at(batch_.M, place.M);
+    result.H = at(batch_.H, place.H);
+    result.f = at(batch_.f, place.f);
+    result.w = at(batch_.w, place.q);
+    result.mu = at(batch_.mu, place.mu);
+    result.guess = at(batch_.guess, place.q);
+    result.r = at(batch_.r, place.q);
+    result.u = at(batch_.u, place.q);
+    result.v = at(batch_.v, place.f);
+    return result;
   }
 
   /// One thread: takes chunks as long as there are some.
   void work(bool polls) {
     // each thread keeps this memory: a caller with one problem at a time allocates nothing either
-    thread_local SmallSolver<D> solver;
-    std::int64_t converged = 0;
-    std::int64_t by_auto = 0;
+    thread_local Memory memory;
+    BatchOutcome outcome;
     if (polls && settings_.poll) last_poll_ = now({});
     for (;;) {
       const std::int64_t first = next_.fetch_add(chunk, std::memory_order_relaxed);
       if (first >= batch_.count) break;
       go_on(polls);
       Place place;
-      if (batch_.nc != nullptr) {
+      if (varies()) {
         place = starts_[static_cast<std::size_t>(first / chunk)];
-      } else {
-        const std::int64_t m = D * static_cast<std::int64_t>(batch_.nc_each);
-        place = {first * m * m, first * m, first * batch_.nc_each};
+      } else if (first > 0) {
+        advance(place, 0);  // the sizes of one
+        for (std::int64_t Place::* member :
+             {&Place::W, &Place::q, &Place::mu, &Place::M, &Place::H, &Place::f}) {
+          place.*member *= first;
+        }
       }
       const std::int64_t last = std::min(first + chunk, batch_.count);
       for (std::int64_t k = first; k < last; ++k) {
         try {
-          solve_one(k, one(k, place), solver, polls, converged, by_auto);
+          solve_one(k, one(k, place), memory, polls, outcome);
         } catch (...) {
           fail(k, std::current_exception());
         }
-        advance(place, contacts(k));
+        advance(place, k);
       }
     }
     const std::lock_guard lock(mutex_);
-    converged_ += converged;
-    by_auto_ += by_auto;
+    outcome_.converged += outcome.converged;
+    outcome_.by_auto += outcome.by_auto;
+    outcome_.invalid += outcome.invalid;
+    if (outcome.invalid > 0 &&
+        (outcome_.first_invalid < 0 || outcome.first_invalid < outcome_.first_invalid)) {
+      outcome_.first_invalid = outcome.first_invalid;
+      outcome_.wrong = std::move(outcome.wrong);
+    }
   }
 
   /// Whether nobody has stopped the batch. One of the threads asks the caller.
@@ -194,27 +217,49 @@ class Runner {
     failed_ = k;
   }
 
-  void check(std::int64_t k, const One& one) const {
-    const auto bad = [&](const char* name, const std::string& what) {
-      throw Error(ErrorKind::problem, what, "problem " + std::to_string(k) + ": " + name);
-    };
+  /// What a thread keeps from one problem to the next.
+  struct Memory {
+    SmallSolver<D> solver;
+    BodyForm<D> bodies;
+  };
+
+  /// Takes the data. Returns what is wrong with them, or an empty text.
+  static std::string take(const One& one, Memory& memory) {
     const std::int64_t m = D * static_cast<std::int64_t>(one.nc);
-    if (!all_finite(one.W, m * m)) bad("W", "has an entry that is not finite");
-    if (!all_finite(one.q, m)) bad("q", "has an entry that is not finite");
+    constexpr const char* not_finite = "has an entry that is not finite";
+    if (one.M == nullptr && !all_finite(one.q, m)) return std::string("q: ") + not_finite;
     for (Index a = 0; a < one.nc; ++a) {
       if (one.mu[a] >= 0 && std::isfinite(one.mu[a])) continue;
-      bad("mu", "contact " + std::to_string(a) + " has " + std::to_string(one.mu[a]) +
-                    ", expected a finite number that is not negative");
+      return "mu: contact " + std::to_string(a) + " has " + std::to_string(one.mu[a]) +
+             ", expected a finite number that is not negative";
     }
     if (one.guess != nullptr && !all_finite(one.guess, m)) {
-      bad("guess", "has an entry that is not finite");
+      return std::string("guess: ") + not_finite;
     }
+    const char* wrong = nullptr;
+    if (one.M != nullptr) {
+      wrong = memory.bodies.take({one.n, one.nc, one.M, one.H, one.f, one.w});
+      if (wrong != nullptr) return wrong;
+      wrong = memory.solver.take(one.nc, memory.bodies.W(), memory.bodies.q(), one.mu);
+    } else if (one.blocks.starts != nullptr) {
+      wrong = memory.solver.take(one.nc, one.blocks, one.q, one.mu);
+    } else {
+      wrong = memory.solver.take(one.nc, one.W, one.q, one.mu);
+    }
+    return wrong == nullptr ? std::string() : std::string("W: ") + wrong;
   }
 
-  void solve_one(std::int64_t k, const One& one, SmallSolver<D>& solver, bool polls,
-                 std::int64_t& converged, std::int64_t& by_auto) {
+  /// The merit's error of r, and u and v.
+  static double judge(const One& one, Memory& memory) {
+    if (one.M != nullptr) return memory.bodies.judge(one.mu, one.r, one.u, one.v);
+    return memory.solver.judge(one.r, one.u);
+  }
+
+  void solve_one(std::int64_t k, const One& one, Memory& memory, bool polls,
+                 BatchOutcome& outcome) {
     const Index nc = one.nc;
     const Index m = D * nc;
+    SmallSolver<D>& solver = memory.solver;
     const auto answer = [&](Status status, double error, std::int64_t iterations) {
       const auto number = static_cast<std::int32_t>(status);
       if (batch_.status != nullptr) {
@@ -225,59 +270,95 @@ class Runner {
         constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
         batch_.iterations[k] = static_cast<std::int32_t>(std::min(iterations, most));
       }
-      converged += status == Status::converged ? 1 : 0;
+      outcome.converged += status == Status::converged ? 1 : 0;
     };
-    const auto begin = [&] {
-      if (one.guess != nullptr) {
-        std::copy_n(one.guess, m, one.r);
-      } else {
-        std::fill_n(one.r, m, 0.0);
+    if (std::string wrong = take(one, memory); !wrong.empty()) {
+      constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+      std::fill_n(one.r, m, nothing);
+      if (one.u != nullptr) std::fill_n(one.u, m, nothing);
+      if (one.v != nullptr) std::fill_n(one.v, one.n, nothing);
+      answer(Status::invalid, std::numeric_limits<double>::infinity(), 0);
+      if (outcome.invalid++ == 0) {  // chunks come in order
+        outcome.first_invalid = k;
+        outcome.wrong = std::move(wrong);
       }
-    };
-    check(k, one);
+      return;
+    }
+    if (one.guess != nullptr) {
+      std::copy_n(one.guess, m, one.r);
+    } else {
+      std::fill_n(one.r, m, 0.0);
+    }
     if (const int why = stopped_.load(std::memory_order_relaxed); why >= 0) {
-      begin();
-      const double error = judge<D>(one);
+      const double error = judge(one, memory);
       answer(error <= settings_.tolerance ? Status::converged : static_cast<Status>(why), error, 0);
       return;
     }
-    bool separating = true;
-    for (Index a = 0; a < nc && separating; ++a) separating = one.q[D * a] >= 0;
-    if (separating) {
-      std::fill_n(one.r, m, 0.0);
-      answer(Status::converged, judge<D>(one), 0);
-      return;
-    }
-    if (nc <= most_contacts) {
-      begin();
-      solver.take(nc, one.W, one.q, one.mu);
-      const double error = solver.solve(settings_.tolerance, one.r, [&] { return judge<D>(one); });
+    if (solver.largest() <= most_contacts) {
+      const double error = solver.solve(
+          settings_.tolerance, one.r, [&] { return judge(one, memory); }, one.M == nullptr);
       if (error <= settings_.tolerance) {
+        if (solver.has_velocities() && one.u != nullptr) std::copy_n(solver.velocities(), m, one.u);
         answer(Status::converged, error, solver.iterations());
         return;
       }
     }
-    ++by_auto;
-    const Result result = solve_by_auto(one, polls);
+    ++outcome.by_auto;
+    const Result result = one.M != nullptr ? by_auto(one, global(one), polls)
+                                           : by_auto(one, local(one, memory.solver), polls);
     std::copy_n(result.solution.r.data(), m, one.r);
     if (one.u != nullptr) std::copy_n(result.solution.u.data(), m, one.u);
+    if (one.v != nullptr) std::copy_n(result.solution.v.data(), one.n, one.v);
     answer(result.status, result.error, result.iterations);
   }
 
-  [[nodiscard]] Result solve_by_auto(const One& one, bool polls) {
-    const Eigen::Index m = D * static_cast<Eigen::Index>(one.nc);
+  static LocalProblem local(const One& one, const SmallSolver<D>& solver) {
     LocalProblem problem;
     problem.spacedim = D;
     problem.mu = Eigen::Map<const Vector>(one.mu, one.nc);
-    problem.q = Eigen::Map<const Vector>(one.q, m);
-    problem.W.storage = Storage::dense;
-    problem.W.rows = problem.W.cols = static_cast<Index>(m);
-    problem.W.x.resize(static_cast<std::size_t>(m * m));
-    Eigen::Map<Eigen::MatrixXd>(problem.W.x.data(), m, m) =
-        Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-            one.W, m, m);
+    problem.q = Eigen::Map<const Vector>(one.q, D * static_cast<Eigen::Index>(one.nc));
+    problem.W = solver.matrix();
+    return problem;
+  }
+
+  static GlobalProblem global(const One& one) {
+    const auto m = D * static_cast<Eigen::Index>(one.nc);
+    GlobalProblem problem;
+    problem.spacedim = D;
+    problem.mu = Eigen::Map<const Vector>(one.mu, one.nc);
+    problem.f = Eigen::Map<const Vector>(one.f, one.n);
+    problem.w = Vector::Zero(m);
+    if (one.w != nullptr) problem.w = Eigen::Map<const Vector>(one.w, m);
+    problem.M.storage = problem.H.storage = Storage::triplet;
+    problem.M.rows = problem.M.cols = problem.H.rows = one.n;
+    problem.H.cols = static_cast<Index>(m);
+    const auto add = [](Matrix& matrix, Index row, Index col, double value) {
+      if (value == 0) return;
+      matrix.i.push_back(row);
+      matrix.p.push_back(col);
+      matrix.x.push_back(value);
+    };
+    for (Index row = 0; row < one.n; ++row) {
+      for (Index col = 0; col <= row; ++col) {
+        const double value = one.M[static_cast<std::int64_t>(one.n) * row + col];
+        add(problem.M, row, col, value);
+        if (col < row) add(problem.M, col, row, value);
+      }
+    }
+    for (Index col = 0; col < m; ++col) {
+      for (Index row = 0; row < one.n; ++row) {
+        add(problem.H, row, col, one.H[static_cast<std::int64_t>(one.n) * col + row]);
+      }
+    }
+    return problem;
+  }
+
+  template <class Problem>
+  [[nodiscard]] Result by_auto(const One& one, const Problem& problem, bool polls) {
     Solution guess;
-    if (one.guess != nullptr) guess.r = Eigen::Map<const Vector>(one.guess, m);
+    if (one.guess != nullptr) {
+      guess.r = Eigen::Map<const Vector>(one.guess, D * static_cast<Eigen::Index>(one.nc));
+    }
     Settings settings;
     settings.tolerance = settings_.tolerance;
     settings.time_limit = deadline_.left();
@@ -289,19 +370,37 @@ class Runner {
   const Batch& batch_;
   const BatchSettings& settings_;
   Deadline deadline_;
-  std::vector<Place> starts_;  // of each chunk, if the numbers of contacts vary
+  std::vector<Place> starts_;  // of each chunk, if the sizes vary
   std::atomic<std::int64_t> next_ = 0;
   std::atomic<int> stopped_ = -1;
   double last_poll_ = 0;  // of the thread that polls
   std::mutex mutex_;
-  std::int64_t converged_ = 0;
-  std::int64_t by_auto_ = 0;
+  BatchOutcome outcome_;
   std::exception_ptr failure_;
   std::int64_t failed_ = 0;
 };
 
 [[noreturn]] void refuse(const char* where, const std::string& message) {
   throw Error(ErrorKind::problem, message, where);
+}
+
+/// The starts say where the next problem begins: all of them must make sense.
+void check_starts(const Batch& batch) {
+  if (batch.one_pattern && batch.nc != nullptr) {
+    refuse("one_pattern", "is true, but problems have different numbers of contacts");
+  }
+  const std::int32_t* starts = batch.starts;
+  const std::int64_t patterns =
+      batch.one_pattern ? std::min<std::int64_t>(batch.count, 1) : batch.count;
+  for (std::int64_t k = 0; k < patterns; ++k) {
+    const Index nc = batch.nc == nullptr ? batch.nc_each : batch.nc[k];
+    bool good = starts[0] == 0;
+    for (Index a = 0; a < nc && good; ++a) good = starts[a] <= starts[a + 1];
+    if (!good) {
+      refuse("starts", "problem " + std::to_string(k) + " does not begin with 0, or goes down");
+    }
+    starts += nc + 1;
+  }
 }
 
 }  // namespace
@@ -317,13 +416,18 @@ BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
   if (settings.threads < 0) throw Error(ErrorKind::option, "is negative", "threads");
   // a dense matrix of the core counts its entries by 32 bits
   constexpr std::int32_t most = 15000;
-  const auto check_count = [&](std::int32_t nc, std::int64_t k) {
-    if (nc >= 0 && nc <= most) return;
-    refuse("nc", "problem " + std::to_string(k) + " has " + std::to_string(nc) +
-                     ", expected 0 to " + std::to_string(most));
+  const auto check = [&](const char* where, std::int32_t size, std::int64_t k) {
+    if (size >= 0 && size <= most) return;
+    refuse(where, "problem " + std::to_string(k) + " has " + std::to_string(size) +
+                      ", expected 0 to " + std::to_string(most));
   };
-  if (batch.nc == nullptr) check_count(batch.nc_each, 0);
-  for (std::int64_t k = 0; batch.nc != nullptr && k < batch.count; ++k) check_count(batch.nc[k], k);
+  const auto check_all = [&](const char* where, const std::int32_t* sizes, std::int32_t each) {
+    if (sizes == nullptr) check(where, each, 0);
+    for (std::int64_t k = 0; sizes != nullptr && k < batch.count; ++k) check(where, sizes[k], k);
+  };
+  check_all("nc", batch.nc, batch.nc_each);
+  if (batch.M != nullptr) check_all("n", batch.n, batch.n_each);
+  if (batch.starts != nullptr) check_starts(batch);
   if (batch.spacedim == 2) return Runner<2>(batch, settings).run();
   return Runner<3>(batch, settings).run();
 }

@@ -7,7 +7,9 @@
 
 #include "contact/alart_curnier.hpp"
 #include "contact/natural_squares.hpp"
+#include "embed/contact_judge.hpp"
 #include "embed/memory.hpp"
+#include "linalg/extended.hpp"
 #include "merit/natural_sums.hpp"
 
 namespace fclib {
@@ -25,9 +27,23 @@ constexpr int first_sweeps = 3;
 /// safer. With many contacts the next statuses are not near, so the light weight is for few.
 constexpr double light = 1e-9;
 constexpr double heavy = 1e-3;
-constexpr Index few_contacts = 12;
+constexpr std::size_t few_contacts = 12;
+/// The largest problem that double precision judges. A row of W r + q has so many terms that its
+/// rounding is less than what the merit allows to a velocity (merit/equations).
+constexpr Index most_bounded = 32;
+/// A bound on the error is at most this part of the tolerance above the error.
+constexpr double bounded_excess = 1e-3;
+/// Roundings of the natural map of one contact, generously.
+constexpr double roundings_of_the_map = 40;
+/// Sweeps of projections go on as long as no more of them are foreseen. They cost a half of exact
+/// ones or less, but more of them are needed, and if contacts are redundant very many.
+constexpr double most_projections = 20;
+/// A sweep solves each contact to this part of what the last sweep has changed, and of what the
+/// tolerance leaves to all.
+constexpr double closeness_to_change = 0.1;
+constexpr double closeness = 0.01;
 /// Unknowns of the largest system that is factorised here. It is dense.
-constexpr Index most_unknowns = 900;
+constexpr std::size_t most_unknowns = 900;
 
 /// Solves A x = b by elimination with column pivots. A (n x n) is by rows, and b stands behind each
 /// row; x replaces b. Returns false if A is singular.
@@ -66,6 +82,18 @@ bool eliminate(double* rows, Index n) {
 
 }  // namespace
 
+namespace {
+
+constexpr const char* not_finite = "has an entry that is not finite";
+
+bool all_finite(const double* x, std::int64_t size) {
+  double sum = 0;  // zero, or NaN: without a branch
+  for (std::int64_t k = 0; k < size; ++k) sum += x[k] * 0.0;
+  return sum == 0;
+}
+
+}  // namespace
+
 template <int D>
 void SmallSolver<D>::resize(Index nc) {
   nc_ = nc;
@@ -73,77 +101,145 @@ void SmallSolver<D>::resize(Index nc) {
   grow(diagonal_, count);
   grow(row_, count + 1);
   grow(rho_, count);
+  grow(steps_, count);
   grow(place_, count);
-  for (auto* vector : {&best_, &last_, &z_}) grow(*vector, D * count);
+  grow(members_, count);
+  grow(root_, count);
+  grow(first_, count + 1);
+  for (auto* vector : {&best_, &u_}) grow(*vector, D * count);
 }
 
 template <int D>
-void SmallSolver<D>::take(Index nc, const double* W, const double* q, const double* mu) {
+const char* SmallSolver<D>::take(Index nc, const double* W, const double* q, const double* mu) {
   resize(nc);
-  q_ = q;
-  mu_ = mu;
+  known_ = Pattern::none;
   const auto count = static_cast<std::size_t>(nc);
   grow(blocks_, count * count);
   grow(column_, count * count);
   std::size_t at = 0;
   const auto m = static_cast<std::ptrdiff_t>(D) * nc;
+  double sum = 0;  // zero, or NaN
   for (Index a = 0; a < nc; ++a) {
     row_[static_cast<std::size_t>(a)] = at;
     for (Index b = 0; b < nc; ++b) {
-      const Eigen::Map<const Eigen::Matrix<double, D, D, Eigen::RowMajor>, 0, Eigen::OuterStride<>>
-          block(W + D * a * m + D * b, Eigen::OuterStride<>(m));
-      if (a == b) {
-        diagonal_[static_cast<std::size_t>(a)] = block;
-      } else {
-        bool empty = true;
-        for (int i = 0; i < D && empty; ++i) {
-          for (int j = 0; j < D; ++j) empty = empty && block(i, j) == 0;
+      const double* from = W + D * a * m + D * b;
+      Mat& to = a == b ? diagonal_[static_cast<std::size_t>(a)] : blocks_[at];
+      bool empty = true;
+      for (int i = 0; i < D; ++i) {
+        for (int j = 0; j < D; ++j) {
+          const double value = from[i * m + j];
+          to(i, j) = value;
+          sum += value * 0.0;
+          empty &= value == 0;
         }
-        if (empty) continue;
-        blocks_[at] = block;
-        column_[at++] = b;
       }
+      if (a == b || empty) continue;
+      column_[at++] = b;
     }
   }
+  if (sum != 0) return not_finite;
   row_[count] = at;
-  prepare();
+  find_islands();
+  prepare(q, mu);
+  return nullptr;
+}
+
+/// Whether W has the pattern of the last one.
+template <int D>
+bool SmallSolver<D>::knows(Pattern kind, Index nc, std::span<const Index> p,
+                           std::span<const Index> i) const {
+  return known_ == kind && nc_ == nc && known_p_size_ == p.size() && known_i_size_ == i.size() &&
+         std::equal(p.begin(), p.end(), known_p_.begin()) &&
+         std::equal(i.begin(), i.end(), known_i_.begin());
+}
+
+template <int D>
+void SmallSolver<D>::know(Pattern kind, std::span<const Index> p, std::span<const Index> i) {
+  known_ = kind;
+  known_p_size_ = p.size();
+  known_i_size_ = i.size();
+  grow(known_p_, p.size());
+  grow(known_i_, i.size());
+  std::copy(p.begin(), p.end(), known_p_.begin());
+  std::copy(i.begin(), i.end(), known_i_.begin());
 }
 
 template <int D>
 const char* SmallSolver<D>::take(const MatrixView& W, const double* q, const double* mu) {
   const Index nc = W.rows / D;
-  resize(nc);
-  q_ = q;
-  mu_ = mu;
-  const auto count = static_cast<std::size_t>(nc);
+  if (W.storage == Storage::dense) return take_dense_by_columns(W, q, mu);
+  const Pattern kind = W.storage == Storage::triplet ? Pattern::triplet
+                       : W.storage == Storage::csc   ? Pattern::csc
+                                                     : Pattern::csr;
+  const auto nnz = static_cast<std::size_t>(W.nnz);
+  const std::size_t pointers = W.storage == Storage::triplet ? nnz
+                               : W.p == nullptr              ? 0
+                                                             : static_cast<std::size_t>(W.rows) + 1;
+  const std::span<const Index> p(W.p, pointers);
+  const std::span<const Index> i(W.i, nnz);
+  if (!knows(kind, nc, p, i)) {
+    known_ = Pattern::none;
+    resize(nc);
+    if (const char* wrong = learn(W)) return wrong;
+    find_islands();
+    know(kind, p, i);
+  } else if (!all_finite(W.x, W.nnz)) {
+    return "has an entry that is not finite, or an index out of range";
+  }
+  for (Index a = 0; a < nc; ++a) diagonal_[static_cast<std::size_t>(a)].setZero();
+  for (std::size_t k = 0; k < row_[static_cast<std::size_t>(nc)]; ++k) blocks_[k].setZero();
+  for (std::size_t k = 0; k < nnz; ++k) {
+    const std::ptrdiff_t place = where_[k];
+    double* to =
+        place < 0 ? diagonal_.front().data() + (-1 - place) : blocks_.front().data() + place;
+    *to += W.x[k];
+  }
+  prepare(q, mu);
+  return nullptr;
+}
+
+template <int D>
+const char* SmallSolver<D>::take_dense_by_columns(const MatrixView& W, const double* q,
+                                                  const double* mu) {
+  const auto m = static_cast<std::size_t>(W.rows);
+  grow(by_rows_, m * m);
+  for (std::size_t row = 0; row < m; ++row) {
+    for (std::size_t col = 0; col < m; ++col) by_rows_[m * row + col] = W.x[m * col + row];
+  }
+  return take(W.rows / D, by_rows_.data(), q, mu);
+}
+
+/// Finds the blocks of a sparse W, and the place of each of its entries in them.
+template <int D>
+const char* SmallSolver<D>::learn(const MatrixView& W) {
+  const auto count = static_cast<std::size_t>(nc_);
   // the entries of each contact's rows
   grow(entry_row_, count + 2);
   std::fill(entry_row_.begin(), entry_row_.end(), 0);
-  const char* wrong = W.visit([&](Index row, Index, double value) {
-    if (value != 0) ++entry_row_[static_cast<std::size_t>(row / D) + 2];
-  });
+  const char* wrong = W.visit(
+      [&](Index row, Index, double) { ++entry_row_[static_cast<std::size_t>(row / D) + 2]; });
   if (wrong != nullptr) return wrong;
   for (std::size_t a = 2; a < count + 2; ++a) entry_row_[a] += entry_row_[a - 1];
   grow(entries_, entry_row_[count + 1]);
-  W.visit([&](Index row, Index col, double value) {
-    if (value != 0) {
-      entries_[entry_row_[static_cast<std::size_t>(row / D) + 1]++] = {col, value, row % D};
-    }
+  grow(where_, entry_row_[count + 1]);
+  std::size_t number = 0;
+  W.visit([&](Index row, Index col, double) {
+    entries_[entry_row_[static_cast<std::size_t>(row / D) + 1]++] = {col, row % D, number++};
   });
   // blocks of them
   grow(block_of_, count);
   std::fill(block_of_.begin(), block_of_.end(), -1);
   std::size_t at = 0;
-  for (Index a = 0; a < nc; ++a) {
+  for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
     row_[self] = at;
-    diagonal_[self].setZero();
     const auto first = static_cast<std::ptrdiff_t>(at);
     for (std::size_t k = entry_row_[self]; k < entry_row_[self + 1]; ++k) {
-      const auto [col, value, component] = entries_[k];
+      const auto [col, component, entry] = entries_[k];
+      const std::ptrdiff_t inside = (col % D) * D + component;  // blocks are by columns
       const Index b = col / D;
       if (b == a) {
-        diagonal_[self](component, col % D) += value;
+        where_[entry] = -1 - (D * D * static_cast<std::ptrdiff_t>(a) + inside);
         continue;
       }
       std::ptrdiff_t& place = block_of_[static_cast<std::size_t>(b)];
@@ -151,21 +247,133 @@ const char* SmallSolver<D>::take(const MatrixView& W, const double* q, const dou
         place = static_cast<std::ptrdiff_t>(at);
         grow(blocks_, at + 1);
         grow(column_, at + 1);
-        blocks_[at].setZero();
         column_[at++] = b;
       }
-      blocks_[static_cast<std::size_t>(place)](component, col % D) += value;
+      where_[entry] = D * D * place + inside;
     }
   }
   row_[count] = at;
-  prepare();
   return nullptr;
+}
+
+template <int D>
+const char* SmallSolver<D>::take(Index nc, const BlockView& W, const double* q, const double* mu) {
+  const auto count = static_cast<std::size_t>(nc);
+  if (W.starts[0] != 0) return "has blocks whose starts do not begin with 0";
+  for (std::size_t a = 0; a < count; ++a) {
+    if (W.starts[a + 1] < W.starts[a]) return "has blocks whose starts are not in order";
+  }
+  const auto number = static_cast<std::size_t>(W.starts[count]);
+  const std::span<const Index> p(W.starts, count + 1);
+  const std::span<const Index> i(W.columns, number);
+  if (!knows(Pattern::blocks, nc, p, i)) {
+    for (const Index b : i) {
+      if (b < 0 || b >= nc) return "has a block whose column is out of range";
+    }
+    known_ = Pattern::none;
+    resize(nc);
+    grow(where_, number);
+    grow(block_of_, count);
+    grow(blocks_, number);
+    grow(column_, number);
+    std::fill(block_of_.begin(), block_of_.end(), -1);
+    std::size_t at = 0;
+    for (Index a = 0; a < nc; ++a) {
+      const auto self = static_cast<std::size_t>(a);
+      row_[self] = at;
+      const auto first = static_cast<std::ptrdiff_t>(at);
+      for (auto k = static_cast<std::size_t>(W.starts[a]);
+           k < static_cast<std::size_t>(W.starts[a + 1]); ++k) {
+        const Index b = W.columns[k];
+        if (b == a) {
+          where_[k] = -1 - static_cast<std::ptrdiff_t>(a);
+          continue;
+        }
+        std::ptrdiff_t& place = block_of_[static_cast<std::size_t>(b)];
+        if (place < first) {
+          place = static_cast<std::ptrdiff_t>(at);
+          column_[at++] = b;
+        }
+        where_[k] = place;
+      }
+    }
+    row_[count] = at;
+    find_islands();
+    know(Pattern::blocks, p, i);
+  }
+  if (!all_finite(W.values, D * D * static_cast<std::int64_t>(number))) return not_finite;
+  for (std::size_t a = 0; a < count; ++a) diagonal_[a].setZero();
+  for (std::size_t k = 0; k < row_[count]; ++k) blocks_[k].setZero();
+  for (std::size_t k = 0; k < number; ++k) {
+    const std::ptrdiff_t place = where_[k];
+    Mat& to = place < 0 ? diagonal_[static_cast<std::size_t>(-1 - place)]
+                        : blocks_[static_cast<std::size_t>(place)];
+    to += Eigen::Map<const Eigen::Matrix<double, D, D, Eigen::RowMajor>>(W.values + D * D * k);
+  }
+  prepare(q, mu);
+  return nullptr;
+}
+
+/// Contacts that blocks connect, directly or by others.
+template <int D>
+void SmallSolver<D>::find_islands() {
+  const auto count = static_cast<std::size_t>(nc_);
+  for (Index a = 0; a < nc_; ++a) root_[static_cast<std::size_t>(a)] = a;
+  const auto root = [&](Index a) {
+    while (root_[static_cast<std::size_t>(a)] != a) {
+      Index& up = root_[static_cast<std::size_t>(a)];
+      up = root_[static_cast<std::size_t>(up)];
+      a = up;
+    }
+    return a;
+  };
+  Index trees = nc_;
+  for (Index a = 0; a < nc_ && trees > 1; ++a) {
+    const auto self = static_cast<std::size_t>(a);
+    for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) {
+      const Index one = root(a);
+      const Index other = root(column_[k]);
+      if (one == other) continue;
+      root_[static_cast<std::size_t>(std::max(one, other))] = std::min(one, other);
+      --trees;
+    }
+  }
+  // the root of an island is its first contact
+  islands_ = static_cast<std::size_t>(trees);
+  largest_ = nc_;
+  first_[0] = 0;
+  first_[islands_] = nc_;
+  if (islands_ <= 1) {
+    for (Index a = 0; a < nc_; ++a) members_[static_cast<std::size_t>(a)] = a;
+    return;
+  }
+  Index number = 0;
+  for (Index a = 0; a < nc_; ++a) {
+    const auto self = static_cast<std::size_t>(a);
+    const Index up = root(a);
+    place_[self] = up == a ? number++ : place_[static_cast<std::size_t>(up)];
+  }
+  std::fill_n(first_.begin(), islands_ + 1, 0);
+  for (std::size_t a = 0; a < count; ++a) ++first_[static_cast<std::size_t>(place_[a]) + 1];
+  largest_ = *std::max_element(first_.begin() + 1,
+                               first_.begin() + static_cast<std::ptrdiff_t>(islands_) + 1);
+  for (std::size_t k = 0; k < islands_; ++k) first_[k + 1] += first_[k];
+  for (std::size_t a = count; a-- > 0;) {
+    members_[static_cast<std::size_t>(--first_[static_cast<std::size_t>(place_[a]) + 1])] =
+        static_cast<Index>(a);
+  }
+  // the ends have become the beginnings
+  for (std::size_t k = 0; k < islands_; ++k) first_[k] = first_[k + 1];
+  first_[islands_] = nc_;
 }
 
 /// The contacts alone, and the scales of the errors.
 template <int D>
-void SmallSolver<D>::prepare() {
+void SmallSolver<D>::prepare(const double* q, const double* mu) {
+  q_ = q;
+  mu_ = mu;
   iterations_ = 0;
+  in_u_ = false;
   contacts_.clear();
   double squares = 0;
   double scaled = 0;
@@ -176,22 +384,140 @@ void SmallSolver<D>::prepare() {
   for (Index a = 0; a < nc_; ++a) scales.add(size_of(a));
   for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
-    contacts_.emplace_back(diagonal_[self], mu_[a]);
     rho_[self] = scales.rho(size_of(a));
     const double square = part(q_, a).squaredNorm();
     squares += square;
     scaled += rho_[self] * rho_[self] * square;
   }
-  scale_ = squares > 0 ? std::sqrt(squares) : 1;
-  scaled_scale_ = scaled > 0 ? std::sqrt(scaled) : 1;
+  whole_scale_ = squares > 0 ? std::sqrt(squares) : 1;
+  whole_scaled_scale_ = scaled > 0 ? std::sqrt(scaled) : 1;
 }
 
-/// (W r + q)_a without W_aa r_a.
+template <int D>
+double SmallSolver<D>::judge(const double* r, double* u) const {
+  using std::abs;  // or that of Real
+  using RealVec = ContactVector<D, Real>;
+  const auto size = [&](std::int64_t a) {
+    Real sum = 0;
+    for (int k = 0; k < D; ++k) sum += abs(Real(diagonal_[static_cast<std::size_t>(a)](k, k))) / D;
+    return sum;
+  };
+  const auto free = [&](std::int64_t a) {
+    RealVec q;
+    for (int k = 0; k < D; ++k) q[k] = q_[D * a + k];
+    return q;
+  };
+  const auto velocity = [&](std::int64_t a) {
+    const auto self = static_cast<std::size_t>(a);
+    RealVec result;
+    result.fill(Real(0));
+    const auto add = [&](const Mat& block, Index b) {
+      for (int j = 0; j < D; ++j) {
+        for (int i = 0; i < D; ++i) result[i] += full_product(block(i, j), r[D * b + j]);
+      }
+    };
+    // the merit sums in the order of the columns
+    std::size_t k = row_[self];
+    for (; k < row_[self + 1] && column_[k] < a; ++k) add(blocks_[k], column_[k]);
+    add(diagonal_[self], static_cast<Index>(a));
+    for (; k < row_[self + 1]; ++k) add(blocks_[k], column_[k]);
+    for (int i = 0; i < D; ++i) {
+      result[i] += Real(q_[D * a + i]);
+      if (u != nullptr) u[D * a + i] = static_cast<double>(result[i]);
+    }
+    return result;
+  };
+  return contact_error<D>(nc_, mu_, r, size, velocity, free);
+}
+
+template <int D>
+Matrix SmallSolver<D>::matrix() const {
+  Matrix result;
+  result.storage = Storage::triplet;
+  result.rows = result.cols = D * nc_;
+  const auto add = [&](const Mat& block, Index a, Index b) {
+    for (int i = 0; i < D; ++i) {
+      for (int j = 0; j < D; ++j) {
+        result.i.push_back(D * a + i);
+        result.p.push_back(D * b + j);
+        result.x.push_back(block(i, j));
+      }
+    }
+  };
+  for (Index a = 0; a < nc_; ++a) {
+    const auto self = static_cast<std::size_t>(a);
+    add(diagonal_[self], a, a);
+    for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) add(blocks_[k], a, column_[k]);
+  }
+  return result;
+}
+
+/// A bound on the merit's error of r, in double precision, with u in u_; infinity if it would be
+/// too far from that error. It adds what rounding may have done. Of n numbers that are added,
+/// rounding changes the sum by at most n units of the sum of their sizes. The natural map changes
+/// by no more than u^, and that by at most 1 + mu times u.
+template <int D>
+double SmallSolver<D>::bounded_error(double tolerance, const double* r) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  if (D * nc_ > most_bounded) return infinity;
+  const double unit = std::numeric_limits<double>::epsilon() * (D * nc_ + roundings_of_the_map);
+  const double mean = whole_scale_;  // at least the mean ||q^a||, for the slip that is rounding
+  NaturalSquares<double> squares;
+  double plain = 0;
+  double impulses = 0;
+  double velocities = 0;
+  for (Index a = 0; a < nc_; ++a) {
+    const auto self = static_cast<std::size_t>(a);
+    Vec u = part(q_, a);
+    Vec terms = u.cwiseAbs();
+    const auto add = [&](const Mat& block, Index b) {
+      for (int j = 0; j < D; ++j) {
+        for (int i = 0; i < D; ++i) {
+          const double product = block(i, j) * r[D * b + j];
+          u[i] += product;
+          terms[i] += std::abs(product);
+        }
+      }
+    };
+    add(diagonal_[self], a);
+    for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) add(blocks_[k], column_[k]);
+    part(u_.data(), a) = u;
+    const Coulomb<D> cone(mu_[a]);
+    const Vec ra = part(r, a);
+    const double rho = rho_[self];
+    squares.add_plain(cone, u, ra);
+    squares.add_scaled(cone, u, ra, rho);
+    const double size = ra.norm();
+    const double speed = terms.norm() + mean;
+    const double factor = unit * (1 + mu_[a]);
+    plain += factor * (speed + size);
+    velocities += factor * (speed + size / rho);
+    impulses += factor * (rho * speed + size);
+  }
+  const double error = squares.error(whole_scale_, whole_scaled_scale_);
+  const double rounding =
+      unit * error +
+      larger_error(plain / whole_scale_, velocities / whole_scale_, impulses / whole_scaled_scale_);
+  if (!(rounding <= bounded_excess * tolerance)) return infinity;
+  in_u_ = true;
+  return error + rounding;
+}
+
+/// (W r + q)_a without W_aa r_a. By components: r was just stored so, and loads of vectors stall.
 template <int D>
 typename SmallSolver<D>::Vec SmallSolver<D>::coupled(Index a, const double* r) const {
-  Vec u = part(q_, a);
+  double sums[D];
+  for (int i = 0; i < D; ++i) sums[i] = q_[D * a + i];
   const auto self = static_cast<std::size_t>(a);
-  for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) u += blocks_[k] * part(r, column_[k]);
+  for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) {
+    const double* const block = blocks_[k].data();
+    const double* const other = r + D * column_[k];
+    for (int j = 0; j < D; ++j) {
+      for (int i = 0; i < D; ++i) sums[i] += block[D * j + i] * other[j];
+    }
+  }
+  Vec u;
+  for (int i = 0; i < D; ++i) u[i] = sums[i];
   return u;
 }
 
@@ -205,15 +531,24 @@ template <int D>
 double SmallSolver<D>::sweep(double* r) {
   double natural = 0;
   double scaled = 0;
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) {
     const auto self = static_cast<std::size_t>(a);
-    Vec next = part(r, a);
-    if (!contacts_[self].solve(coupled(a, r), next)) {
+    double* const own = r + D * a;
+    Vec next;
+    for (int i = 0; i < D; ++i) next[i] = own[i];
+    const Vec others = coupled(a, r);
+    // a root that is only near may have a negative normal part
+    if (!contacts_[self].solve(others, next, close_ * rho_[self]) &&
+        !contacts_[self].solve(others, next)) {
       solvable_ = false;
       return 0;
     }
-    const double change = (next - part(r, a)).squaredNorm();
-    part(r, a) = next;
+    double change = 0;
+    for (int i = 0; i < D; ++i) {
+      const double by = next[i] - own[i];
+      change += by * by;
+      own[i] = next[i];
+    }
     natural += change / (rho_[self] * rho_[self]);
     scaled += change;
   }
@@ -221,10 +556,74 @@ double SmallSolver<D>::sweep(double* r) {
   return std::max(std::sqrt(natural) / scale_, std::sqrt(scaled) / scaled_scale_);
 }
 
+/// A sweep of steps by the diagonal of W, each projected on the disk of its contact. Returns the
+/// change, as sweep() does.
+template <int D>
+double SmallSolver<D>::projected_sweep(double* r) {
+  double natural = 0;
+  double scaled = 0;
+  for (const Index a : now_) {
+    const auto self = static_cast<std::size_t>(a);
+    const Mat& block = diagonal_[self];
+    const Step& step = steps_[self];
+    double* const own = r + D * a;
+    const Vec others = coupled(a, r);
+    double next[D];
+    double square = 0;
+    for (int i = 0; i < D; ++i) {
+      next[i] = others[i];
+      for (int j = 0; j < D; ++j) next[i] += block(i, j) * own[j];
+    }
+    next[0] = std::max(0.0, own[0] - step.normal * next[0]);
+    for (int i = 1; i < D; ++i) {
+      next[i] = own[i] - step.tangent * next[i];
+      square += next[i] * next[i];
+    }
+    const double radius = mu_[a] * next[0];
+    const double scale = square > radius * radius ? radius / std::sqrt(square) : 1.0;
+    double change = 0;
+    for (int i = 0; i < D; ++i) {
+      if (i > 0) next[i] *= scale;
+      const double by = next[i] - own[i];
+      change += by * by;
+      own[i] = next[i];
+    }
+    natural += change * step.square;
+    scaled += change;
+  }
+  ++iterations_;
+  return std::max(std::sqrt(natural) / scale_, std::sqrt(scaled) / scaled_scale_);
+}
+
+/// Projected sweeps as long as few of them are foreseen. Returns whether r meets the tolerance.
+template <int D>
+bool SmallSolver<D>::project(double tolerance, double* r) {
+  for (const Index a : now_) {
+    const auto self = static_cast<std::size_t>(a);
+    const Mat& block = diagonal_[self];
+    double most = 0;
+    for (int i = 1; i < D; ++i) most = std::max(most, block(i, i));
+    if (!(block(0, 0) > 0) || !(most > 0)) return false;
+    steps_[self] = {1 / block(0, 0), 1 / most, 1 / (rho_[self] * rho_[self])};
+  }
+  double last = 0;
+  for (int k = 1; k <= most_sweeps; ++k) {
+    const double change = projected_sweep(r);
+    if (change <= tolerance && error(r) <= tolerance) return true;
+    if (!std::isfinite(change)) return false;
+    if (k % first_sweeps == 0) {
+      const double rate = std::log(last / change);
+      if (!(rate > 0) || std::log(change / tolerance) > most_projections * rate) return false;
+    }
+    last = change;
+  }
+  return false;
+}
+
 template <int D>
 double SmallSolver<D>::error(const double* r) const {
   NaturalSquares<double> squares;
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) {
     const Coulomb<D> cone(mu_[a]);
     const Vec u = velocity(a, r);
     const Vec ra = part(r, a);
@@ -239,18 +638,24 @@ template <int D>
 bool SmallSolver<D>::keep(double error, const double* r, double& best) {
   if (!(error < best)) return false;
   best = error;
-  std::copy_n(r, D * nc_, best_.begin());
+  for (const Index a : now_) part(best_.data(), a) = part(r, a);
   return true;
+}
+
+template <int D>
+void SmallSolver<D>::restore(double* r) const {
+  for (const Index a : now_) part(r, a) = part(best_.data(), a);
 }
 
 /// The number of operations, roughly.
 template <int D>
 double SmallSolver<D>::sweep_cost() const {
-  return 200.0 * nc_ + 2.0 * D * D * static_cast<double>(row_[static_cast<std::size_t>(nc_)]);
+  const auto count = static_cast<double>(now_.size());
+  return 200.0 * count + 2.0 * D * D * static_cast<double>(blocks_now_);
 }
 template <int D>
 double SmallSolver<D>::newton_cost() const {
-  const double n = D * nc_;
+  const double n = D * static_cast<double>(now_.size());
   return 2.0 / 3.0 * n * n * n + 6 * n * n + 2 * sweep_cost();
 }
 
@@ -259,13 +664,13 @@ template <int D>
 bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
   Index count = 0;
   // open contacts are left out
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) {
     const Vec u = velocity(a, r);
     const double rho = rho_[static_cast<std::size_t>(a)];
     const bool open = !(r[D * a] - rho * u[0] > 0);
     place_[static_cast<std::size_t>(a)] = open ? -1 : count++;
   }
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) {
     if (place_[static_cast<std::size_t>(a)] < 0) part(r, a).setZero();
   }
   const Index n = D * count;
@@ -273,9 +678,9 @@ bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
   grow(system_, static_cast<std::size_t>(n) * width);
   std::fill_n(system_.begin(), static_cast<std::size_t>(n) * width, 0.0);
   double trace = 0;
-  for (Index a = 0; a < nc_; ++a) trace += 1 / rho_[static_cast<std::size_t>(a)];
-  const double weight = weight_of_mean * trace / nc_;
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) trace += 1 / rho_[static_cast<std::size_t>(a)];
+  const double weight = weight_of_mean * trace / static_cast<double>(now_.size());
+  for (const Index a : now_) {
     const auto self = static_cast<std::size_t>(a);
     const Index at = place_[self];
     if (at < 0) continue;
@@ -302,7 +707,7 @@ bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
     rows.col(n) = left;
   }
   if (!eliminate(system_.data(), n)) return false;
-  for (Index a = 0; a < nc_; ++a) {
+  for (const Index a : now_) {
     const Index at = place_[static_cast<std::size_t>(a)];
     if (at < 0) continue;
     for (int k = 0; k < D; ++k) {
@@ -316,8 +721,10 @@ bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
 /// Makes steps from r as long as they improve it. Returns whether r meets the tolerance.
 template <int D>
 bool SmallSolver<D>::newton(int attempt, double tolerance, double* r, double& best) {
-  double weight = nc_ <= few_contacts && attempt == 0 ? light : heavy * std::pow(10, attempt / 2);
+  double weight =
+      now_.size() <= few_contacts && attempt == 0 ? light : heavy * std::pow(10, attempt / 2);
   int worse = 0;
+  close_ = 0;
   for (int k = 0; k < (1 + attempt) * newton_steps && worse < 3 + 2 * attempt; ++k) {
     if (!newton_step(weight, r)) break;
     sweep(r);
@@ -332,34 +739,80 @@ bool SmallSolver<D>::newton(int attempt, double tolerance, double* r, double& be
       ++worse;
     }
   }
-  std::copy_n(best_.begin(), D * nc_, r);
+  restore(r);
   return false;
 }
 
+/// Solves an island so that its part of the error is at most its contacts' part of the tolerance.
 template <int D>
-bool SmallSolver<D>::solve(double tolerance, double* r) {
+bool SmallSolver<D>::solve_island(std::size_t k, double tolerance, double* r) {
+  now_ = island(k);
+  const double share =
+      islands_ == 1 ? 1.0 : std::sqrt(static_cast<double>(now_.size()) / static_cast<double>(nc_));
+  scale_ = share * whole_scale_;
+  scaled_scale_ = share * whole_scaled_scale_;
+  double least = std::numeric_limits<double>::infinity();
+  blocks_now_ = 0;
+  bool guessed = false;
+  bool separating = true;
+  for (const Index a : now_) {
+    const auto self = static_cast<std::size_t>(a);
+    blocks_now_ += row_[self + 1] - row_[self];
+    least = std::min(least, 1 / rho_[self]);
+    guessed = guessed || !part(r, a).isZero(0);
+    separating = separating && q_[D * a] >= 0;
+  }
+  close_of_error_ = std::min(scale_, scaled_scale_ * least);
+  if (separating) {
+    for (const Index a : now_) part(r, a).setZero();
+    return true;
+  }
+  if (guessed) {
+    const double start = error(r);
+    if (start <= tolerance || seek(tolerance, start, r)) return true;
+    for (const Index a : now_) part(r, a).setZero();
+  }
+  return seek(tolerance, 1.0, r);  // the error of r = 0 is about 1
+}
+
+/// Improves r, whose error is `start`, on the island until its error is at most the tolerance. If
+/// not, r is the best iterate.
+template <int D>
+bool SmallSolver<D>::seek(double tolerance, double start, double* r) {
   solvable_ = true;
+  if (project(tolerance, r)) return true;
+  if (contacts_.empty()) {
+    for (Index a = 0; a < nc_; ++a) {
+      contacts_.emplace_back(diagonal_[static_cast<std::size_t>(a)], mu_[a]);
+    }
+  }
   double best = std::numeric_limits<double>::infinity();
   double last = 0;
   int attempts = 0;
   int next_attempt = first_sweeps;
   // sweeps; the rate tells little about many of them
   const double worth = std::min(4 * newton_cost() / sweep_cost(), most_foreseen);
+  const bool alone = now_.size() == 1;
+  double close = closeness * tolerance;
+  double change = std::min(start, 1.0);
   for (int k = 1; k <= most_sweeps; ++k) {
-    const double change = sweep(r);
+    close_ = alone ? 0.0 : close_of_error_ * std::max(close, closeness_to_change * change);
+    change = sweep(r);
     if (!solvable_ || !std::isfinite(change)) return false;
-    if (nc_ == 1) return true;  // exact: the merit decides
+    if (alone) return true;  // exact: the merit decides
     if (change <= 2 * tolerance) {
       const double now = error(r);
       if (now <= tolerance) return true;
       keep(now, r, best);
+      close *= 0.1;  // if the sweeps stop here, this is why
     }
-    const double rate = std::log(last / change);
+    const double before = last;
     last = change;
     if (k < next_attempt) continue;
+    const double rate = std::log(before / change);
     const double left = std::log(change / tolerance) / rate;
     if (rate > 0 && left < worth) continue;
-    if (D * nc_ > most_unknowns || attempts == newton_attempts) {
+    if (D * now_.size() > most_unknowns || attempts == newton_attempts) {
       if (left > most_sweeps) return false;
       continue;
     }
@@ -369,7 +822,7 @@ bool SmallSolver<D>::solve(double tolerance, double* r) {
     next_attempt = k + first_sweeps * attempts * attempts;
     last = 0;
   }
-  std::copy_n(best_.begin(), D * nc_, r);
+  if (best < std::numeric_limits<double>::infinity()) restore(r);
   return false;
 }
 

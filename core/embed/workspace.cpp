@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "embed/contact_judge.hpp"
 #include "embed/memory.hpp"
-#include "merit/natural_sums.hpp"
 #include "solve/driver.hpp"
 
 namespace fclib {
@@ -101,39 +101,33 @@ void Workspace::keep(int spacedim, std::span<const std::int64_t> contacts,
 /// u = W r + q, and the merit of r, both in extended precision.
 template <int D>
 double Workspace::judge(const LocalView& problem) {
-  using std::abs, std::sqrt;  // or those of Real
-  using Vec = ContactVector<D, Real>;
+  using std::abs;  // or that of Real
   const std::size_t nc = problem.mu.size();
   std::fill_n(real_.begin(), D * nc, Real(0));
-  std::fill_n(size_.begin(), nc, Real(0));
+  std::fill_n(size_.begin(), D * nc, Real(0));
   problem.W.visit([&](Index row, Index col, double value) {
     real_[static_cast<std::size_t>(row)] += full_product(value, r_[static_cast<std::size_t>(col)]);
-    if (row == col) size_[static_cast<std::size_t>(row / D)] += abs(Real(value)) / D;
+    if (row == col) size_[static_cast<std::size_t>(row)] += Real(value);
   });
-  ContactScales<Real> scales;
-  for (std::size_t a = 0; a < nc; ++a) scales.add(size_[a]);
-  Real squares = 0;
-  for (std::size_t k = 0; k < D * nc; ++k) squares += full_product(problem.q[k], problem.q[k]);
-  const Real mean = sqrt(squares / static_cast<double>(nc));
-  NaturalSums<Coulomb<D, Real>> sums;
-  for (std::size_t a = 0; a < nc; ++a) {
-    Vec u;
-    Vec q;
-    Vec r;
-    for (int k = 0; k < D; ++k) {
-      const std::size_t at = D * a + static_cast<std::size_t>(k);
-      q[k] = problem.q[at];
-      r[k] = r_[at];
-      u[k] = real_[at] + q[k];
-      u_[at] = static_cast<double>(u[k]);
-    }
-    const Real rho = scales.rho(size_[a]);
-    const Coulomb<D, Real> cone(problem.mu[a]);
-    const Real q_square = q.squaredNorm();
-    const Real slip = slip_of_rounding<Real>(sqrt(q_square), mean);
-    sums.add(cone, u, r, q_square, Real(0), rho, {slip});
+  for (std::size_t k = 0; k < D * nc; ++k) {
+    real_[k] += Real(problem.q[k]);
+    u_[k] = static_cast<double>(real_[k]);
   }
-  return sums.error();
+  const auto of = [](const auto& x) {
+    return [&x](std::int64_t a) {
+      ContactVector<D, Real> part;
+      for (int k = 0; k < D; ++k) part[k] = x[static_cast<std::size_t>(D * a + k)];
+      return part;
+    };
+  };
+  // entries of a triplet add up before their size counts
+  const auto size = [&](std::int64_t a) {
+    Real sum = 0;
+    for (int k = 0; k < D; ++k) sum += abs(size_[static_cast<std::size_t>(D * a + k)]) / D;
+    return sum;
+  };
+  return contact_error<D>(static_cast<std::int64_t>(nc), problem.mu.data(), r_.data(), size,
+                          of(real_), of(problem.q));
 }
 
 template <int D>
@@ -141,19 +135,13 @@ Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& p
                                       const Settings& settings) {
   const std::size_t nc = problem.mu.size();
   Answer answer;
-  bool separating = true;
-  for (std::size_t a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
   if (const char* wrong = solver.take(problem.W, problem.q.data(), problem.mu.data())) {
     refuse("W", wrong);
   }
-  if (separating) {
-    std::fill_n(r_.begin(), D * nc, 0.0);
-    answer.error = judge<D>(problem);
-    answer.status = Status::converged;
-    return answer;
-  }
-  if (nc <= most_contacts) {
-    answer.error = solver.solve(settings.tolerance, r_.data(), [&] { return judge<D>(problem); });
+  if (static_cast<std::size_t>(solver.largest()) <= most_contacts) {
+    // the answer has the merit itself, not a bound on it
+    answer.error =
+        solver.solve(settings.tolerance, r_.data(), [&] { return judge<D>(problem); }, false);
     answer.iterations = solver.iterations();
     if (answer.error <= settings.tolerance) {
       answer.status = Status::converged;
@@ -184,7 +172,7 @@ Workspace::Answer Workspace::solve(const LocalView& problem, std::span<const std
   grow(r_, m);
   grow(u_, m);
   grow(real_, m);
-  grow(size_, problem.mu.size());
+  grow(size_, m);
   guess(problem.spacedim, contacts, {r_.data(), m});
   Answer answer = problem.spacedim == 2 ? solve_in(plane_, problem, settings)
                                         : solve_in(space_, problem, settings);

@@ -32,7 +32,9 @@ enum class Status {
   stalled,          ///< the solver has nothing left to try; its best iterate is returned
   interrupted,      ///< the callback stopped it
   infeasible,       ///< there is no solution: ReducedProblem::proves_no_solution has confirmed it
+  invalid,          ///< of a problem in a batch: its data are not valid
 };
+inline constexpr std::size_t status_count = static_cast<std::size_t>(Status::invalid) + 1;
 
 constexpr std::string_view name_of(Status status) {
   switch (status) {
@@ -52,6 +54,8 @@ constexpr std::string_view name_of(Status status) {
       return "interrupted";
     case Status::infeasible:
       return "infeasible";
+    case Status::invalid:
+      return "invalid";
   }
   return "?";
 }

@@ -10,6 +10,8 @@ import importlib
 import typing
 
 from fclib._batch import BatchResult, solve_batch
+from fclib._batch_derivatives import BatchGradient, BatchTangent, jvp_batch, vjp_batch
+from fclib._batch_global import solve_batch_global
 from fclib._core import (
     ChainMethod,
     Error,
@@ -161,7 +163,9 @@ def profile(store: "str | Path", **options: typing.Any) -> typing.Any:
 
 
 __all__ = [
+    "BatchGradient",
     "BatchResult",
+    "BatchTangent",
     "Bodies",
     "ChainMethod",
     "Contacts",
@@ -203,6 +207,7 @@ __all__ = [
     "digest",
     "find_solver",
     "jvp",
+    "jvp_batch",
     "left_out",
     "load",
     "merge",
@@ -218,12 +223,14 @@ __all__ = [
     "sequence",
     "solve",
     "solve_batch",
+    "solve_batch_global",
     "solver",
     "solvers",
     "step_path",
     "steps",
     "sync_files",
     "vjp",
+    "vjp_batch",
     "write",
     "write_attributes",
     "write_guesses",

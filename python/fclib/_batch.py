@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
@@ -23,12 +24,14 @@ class BatchResult(EqualByEntries):
         r: reactions [N s], in the shape of q.
         u: velocities W r + q [m/s], in the shape of q.
         status: (count,) places in ``BatchResult.statuses``; 0 is converged.
-        error: (count,) Merit.error of each.
+        error: (count,) of each at least Merit.error, and at most a thousandth of tol above it.
         iterations: (count,) sweeps and Newton steps; those of ``auto`` if it solved the problem.
         offsets: (count + 1,) start of each problem's part of r and u, if the numbers of contacts
             vary; else None.
         by_auto: number of problems that the solver ``auto`` got, because the fast method did not
             solve them.
+        v: velocities of the bodies, of global problems; else None.
+        wrong: what is wrong with the first problem whose data are not valid; "" if all are.
     """
 
     r: Floats
@@ -38,6 +41,8 @@ class BatchResult(EqualByEntries):
     iterations: npt.NDArray[np.int32]
     offsets: npt.NDArray[np.int64] | None
     by_auto: int
+    v: Floats | None = None
+    wrong: str = ""
 
     statuses: ClassVar[tuple[str, ...]] = tuple(_core.status_names())
 
@@ -50,7 +55,7 @@ class BatchResult(EqualByEntries):
         return np.equal(self.status, 0)
 
     def __repr__(self) -> str:
-        worst = self.error.max() if len(self) else 0.0
+        worst = np.max(self.error, initial=0.0)
         return (
             f"<BatchResult: {np.count_nonzero(self.converged)} of {len(self)} converged, "
             f"worst error {worst:.1e}>"
@@ -67,6 +72,7 @@ def solve_batch(
     velocity: Any = None,
     spacedim: int = 3,
     contacts: Any = None,
+    pattern: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     guess: Any = None,
     tol: float = 1e-8,
     threads: int = 1,
@@ -75,12 +81,15 @@ def solve_batch(
 ) -> Any:
     """Solve many local problems, u = W r + q with Coulomb's law, without Python between them.
 
-    Small problems have their own method, which allocates no memory for each. Problems that it does
-    not solve go to the solver ``auto``. Python's lock is released.
+    Small problems have their own method, which allocates no memory for each. Contacts that no block
+    of W connects are solved apart from each other. Problems that the method does not solve go to
+    the solver ``auto``. Python's lock is released.
 
     Args:
         W: (count, m, m) matrices, m = spacedim * nc. If ``contacts`` is given: all entries one
-            after another, matrix by matrix, each by rows. Or a list of matrices of any sizes.
+            after another, matrix by matrix, each by rows. Or a list of matrices of any sizes,
+            which may be sparse ones of SciPy. If ``pattern`` is given: (count, blocks, spacedim,
+            spacedim).
         q: (count, m) velocities without reactions; flat, or a list, as W.
         mu: (count, nc) coefficients of friction, or anything that NumPy broadcasts to it: (nc,), a
             number. Flat, or a list, as W.
@@ -92,6 +101,8 @@ def solve_batch(
             given as q besides.
         spacedim: 3, or 2 for planar problems.
         contacts: (count,) numbers of contacts, if they differ between problems.
+        pattern: (starts, columns) of the blocks of every W, as ``indptr`` and ``indices`` of
+            SciPy's bsr_array: starts (nc + 1), columns (blocks).
         guess: reactions to start from, in the shape of q.
         tol: bound on Merit.error of each.
         threads: number of threads that share the batch; 0: all of the machine. The result is the
@@ -102,26 +113,19 @@ def solve_batch(
 
     If an array is on a GPU (of CuPy, PyTorch, JAX, Warp), all is solved there, without a copy and
     in the order of the caller's stream, and a ``DeviceBatchResult`` is returned. This needs
-    ``fclib[gpu]``. A problem with an entry that is not finite, or a negative mu, then has the
-    status "invalid", and r = 0.
+    ``fclib[gpu]``. A problem that is not valid then has r = 0.
 
     Returns:
-        Arrays over the problems. A problem is ``converged`` only if the merit, recomputed in
-        extended precision, confirms it.
+        Arrays over the problems. A problem is ``converged`` only if its merit confirms it,
+        recomputed in extended precision, or in double precision with a bound on the rounding. A
+        problem with an entry that is not finite, or a negative mu, has NaN for r and u and the
+        status "invalid"; it changes nothing for the others.
 
     Raises:
-        ProblemError: sizes that do not agree, entries that are not finite, a negative mu; it names
-            the problem.
+        ProblemError: sizes that do not agree.
         OptionError: tol, threads or time_limit out of range.
     """
-    if spacedim not in (2, 3):
-        raise _core.ProblemError(f"spacedim: is {spacedim}, expected 2 or 3")
-    if not tol >= 0:
-        raise _core.OptionError(f"tol: {tol} is not a positive number")
-    if threads < 0:
-        raise _core.OptionError(f"threads: {threads} is negative")
-    if time_limit is not None and not time_limit > 0:
-        raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    check_options(spacedim, tol, threads, time_limit)
     if unsolved not in ("cpu", "leave"):
         raise _core.OptionError(f'unsolved: is {unsolved!r}, expected "cpu" or "leave"')
     if jacobian is None and (inverse_mass is not None or velocity is not None):
@@ -147,73 +151,193 @@ def solve_batch(
             unsolved=unsolved,
             on_cpu=solve_batch,
         )
+    if pattern is not None and (jacobian is not None or W is None):
+        raise _core.ProblemError("pattern: is for W, given by blocks")
     if jacobian is not None:
         W, q = _of_bodies(spacedim, jacobian, inverse_mass, velocity, q, contacts)
-    ragged = isinstance(W, (list, tuple)) and contacts is None
-    if ragged:
-        contacts = [np.size(one) // spacedim for one in _sequence("q", q)]
+    sizes: tuple[int, ...]
     offsets: npt.NDArray[np.int64] | None = None
     counts: npt.NDArray[np.int32] | None = None
-    shape: tuple[int, ...]
-    if contacts is None:
-        matrices = _floats("W", W)
-        if matrices.ndim != 3 or matrices.shape[1] != matrices.shape[2]:
-            raise _core.ProblemError(
-                f"W: has the shape {matrices.shape}, expected (count, m, m); problems of different "
-                "sizes need contacts, or lists"
-            )
-        count, m = matrices.shape[:2]
-        if m % spacedim:
-            raise _core.ProblemError(f"W: m = {m} is no multiple of spacedim = {spacedim}")
-        each, shape = m // spacedim, (count, m)
-        friction = _broadcast("mu", mu, (count, each))
-        velocity = _shaped("q", q, shape)
-        start = None if guess is None else _shaped("guess", guess, shape)
-    else:
-        given = np.asarray(contacts)
-        if given.ndim != 1 or (given.dtype.kind not in "iu" and given.size > 0):
-            raise _core.ProblemError("contacts: is not a list of whole numbers")
-        if given.size > 0 and not 0 <= given.min() <= given.max() <= 15000:
-            raise _core.ProblemError("contacts: a number is not in 0 to 15000")
-        counts = np.ascontiguousarray(given, dtype=np.int32)
+    starts = columns = None
+    if pattern is not None:
+        if contacts is not None:
+            raise _core.ProblemError("pattern: is for problems with the same contacts")
+        starts, columns, matrices = _blocks_of(pattern, W, spacedim)
+        count, each = len(matrices), len(starts) - 1
+        sizes = (count, each * spacedim)
+    elif isinstance(W, (list, tuple)) and contacts is None:
+        contacts = [np.size(one) // spacedim for one in _sequence("q", q)]
+    if contacts is not None:
+        counts = check_contacts(contacts)
         count, each = len(counts), 0
-        sizes = spacedim * counts.astype(np.int64)
-        offsets = np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
-        shape = (int(offsets[-1]),)
-        matrices = _shaped("W", _flat("W", W, sizes**2), (int(np.sum(sizes**2)),))
-        velocity = _shaped("q", _flat("q", q, sizes), shape)
-        friction = _broadcast("mu", _flat("mu", mu, counts), (int(counts.sum()),))
-        start = None if guess is None else _shaped("guess", _flat("guess", guess, sizes), shape)
+        lengths = spacedim * counts.astype(np.int64)
+        offsets = np.concatenate(([0], np.cumsum(lengths))).astype(np.int64)
+        sizes = (int(offsets[-1]),)
+        if isinstance(W, (list, tuple)) and any(hasattr(one, "tocsr") for one in W):
+            starts, columns, matrices = _blocks_of_each(W, counts, spacedim)
+        else:
+            matrices = shaped("W", flat("W", W, lengths**2), (int(np.sum(lengths**2)),))
+        velocity = shaped("q", flat("q", q, lengths), sizes)
+        friction = broadcast("mu", flat("mu", mu, counts), (int(counts.sum()),))
+        start = None if guess is None else shaped("guess", flat("guess", guess, lengths), sizes)
+    else:
+        if pattern is None:
+            matrices = floats("W", W)
+            if matrices.ndim != 3 or matrices.shape[1] != matrices.shape[2]:
+                raise _core.ProblemError(
+                    f"W: has the shape {matrices.shape}, expected (count, m, m); problems of "
+                    "different sizes need contacts, or lists"
+                )
+            sizes = matrices.shape[:2]
+            count, m = sizes
+            if m % spacedim:
+                raise _core.ProblemError(f"W: m = {m} is no multiple of spacedim = {spacedim}")
+            each = m // spacedim
+        friction = broadcast("mu", mu, (count, each))
+        velocity = shaped("q", q, sizes)
+        start = None if guess is None else shaped("guess", guess, sizes)
+    given = {
+        "W": matrices.reshape(-1),
+        "q": velocity.reshape(-1),
+        "starts": starts,
+        "columns": columns,
+        "one_pattern": pattern is not None,
+    }
+    return run(
+        given, spacedim, count, each, counts, offsets, sizes, friction, start, None, tol, threads,
+        time_limit,
+    )  # fmt: skip
+
+
+def check_options(spacedim: int, tol: float, threads: int, time_limit: float | None) -> None:
+    """ProblemError or OptionError if one is out of range."""
+    if spacedim not in (2, 3):
+        raise _core.ProblemError(f"spacedim: is {spacedim}, expected 2 or 3")
+    if not tol >= 0:
+        raise _core.OptionError(f"tol: {tol} is not a positive number")
+    if threads < 0:
+        raise _core.OptionError(f"threads: {threads} is negative")
+    if time_limit is not None and not time_limit > 0:
+        raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+
+
+def check_contacts(contacts: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """The numbers of contacts, of each problem one."""
+    given = np.asarray(contacts)
+    if given.ndim != 1 or (given.dtype.kind not in "iu" and given.size > 0):
+        raise _core.ProblemError("contacts: is not a list of whole numbers")
+    if given.size > 0 and not 0 <= given.min() <= given.max() <= 15000:
+        raise _core.ProblemError("contacts: a number is not in 0 to 15000")
+    return np.ascontiguousarray(given, dtype=np.int32)
+
+
+def run(
+    given: dict[str, Any],
+    spacedim: int,
+    count: int,
+    each: int,
+    counts: npt.NDArray[np.int32] | None,
+    offsets: npt.NDArray[np.int64] | None,
+    shape: tuple[int, ...],
+    mu: Floats,
+    guess: Floats | None,
+    v: Floats | None,
+    tol: float,
+    threads: int,
+    time_limit: float | None,
+) -> BatchResult:
+    """Solve problems whose sizes have been checked; `given` has what the core names so."""
     r, u = np.empty(shape), np.empty(shape)
     status = np.empty(count, dtype=np.int32)
     error = np.empty(count)
     iterations = np.empty(count, dtype=np.int32)
-    by_auto = _core.solve_batch(
-        spacedim,
-        count,
-        each,
-        counts,
-        matrices.reshape(-1),
-        velocity.reshape(-1),
-        friction.reshape(-1),
-        None if start is None else start.reshape(-1),
-        r.reshape(-1),
-        u.reshape(-1),
-        status,
-        error,
-        iterations,
-        tol,
-        threads,
-        math.inf if time_limit is None else time_limit,
+    names = ("W", "q", "starts", "columns", "n", "M", "H", "f", "w")
+    by_auto, first, wrong = _core.solve_batch(
+        spacedim=spacedim,
+        count=count,
+        each=each,
+        nc=counts,
+        one_pattern=given.get("one_pattern", False),
+        n_each=given.get("n_each", 0),
+        **{name: given.get(name) for name in names},
+        mu=mu.reshape(-1),
+        guess=None if guess is None else guess.reshape(-1),
+        r=r.reshape(-1),
+        u=u.reshape(-1),
+        v=None if v is None else v.reshape(-1),
+        status=status,
+        error=error,
+        iterations=iterations,
+        tolerance=tol,
+        threads=threads,
+        time_limit=math.inf if time_limit is None else time_limit,
     )
-    return BatchResult(r, u, status, error, iterations, offsets, by_auto)
+    if wrong:
+        wrong = f"problem {first}: {wrong}"
+    return BatchResult(r, u, status, error, iterations, offsets, by_auto, v, wrong)
+
+
+def _indices(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    array = np.asarray(values)
+    if array.ndim != 1 or (array.dtype.kind not in "iu" and array.size > 0):
+        raise _core.ProblemError(f"pattern: {name} is not a list of whole numbers")
+    return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def _blocks_of(
+    pattern: Any, W: Any, spacedim: int
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], Floats]:
+    """One pattern and the blocks of each problem."""
+    if not isinstance(pattern, (list, tuple)) or len(pattern) != 2:
+        raise _core.ProblemError("pattern: is not (starts, columns)")
+    starts, columns = _indices("starts", pattern[0]), _indices("columns", pattern[1])
+    if len(starts) == 0 or starts[-1] != len(columns):
+        raise _core.ProblemError("pattern: the last of starts is not the number of columns")
+    blocks = floats("W", W)
+    wanted = (len(columns), spacedim, spacedim)
+    if blocks.ndim != 4 or blocks.shape[1:] != wanted:
+        raise _core.ProblemError(
+            f"W: has the shape {blocks.shape}, expected (count, {', '.join(map(str, wanted))}) as "
+            "pattern has these blocks"
+        )
+    return starts, columns, blocks
+
+
+def _blocks_of_each(
+    W: Sequence[Any], counts: npt.NDArray[np.int32], spacedim: int
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], Floats]:
+    """The blocks of matrices of SciPy, one problem behind another."""
+    import scipy.sparse as sp
+
+    if len(W) != len(counts):
+        raise _core.ProblemError(
+            f"W: has {len(W)} problems, expected {len(counts)} as there are contacts"
+        )
+    starts, columns, values = [], [], []
+    for k, (one, nc) in enumerate(zip(W, counts, strict=True)):
+        m = spacedim * int(nc)
+        if np.shape(one) != (m, m):
+            raise _core.ProblemError(
+                f"W: problem {k} has the shape {np.shape(one)}, expected {(m, m)}"
+            )
+        blocks = sp.csr_array(one).tobsr(blocksize=(spacedim, spacedim))
+        blocks.sort_indices()
+        starts.append(blocks.indptr)
+        columns.append(blocks.indices)
+        values.append(floats("W", blocks.data).reshape(-1))
+    empty = np.empty(0)
+    return (
+        np.concatenate([empty, *starts]).astype(np.int32),
+        np.concatenate([empty, *columns]).astype(np.int32),
+        np.concatenate([empty, *values]),
+    )
 
 
 def _of_bodies(
     spacedim: int, jacobian: Any, inverse_mass: Any, velocity: Any, q: Any, contacts: Any
 ) -> tuple[Any, Any]:
     """W and q of problems given by their bodies; lists of them if the numbers of contacts vary."""
-    matrix = _floats("jacobian", jacobian)
+    matrix = floats("jacobian", jacobian)
     if inverse_mass is None:
         raise _core.ProblemError("inverse_mass: is missing")
     if velocity is None and q is None:
@@ -225,23 +349,23 @@ def _of_bodies(
         )
     nv = matrix.shape[-1]
     count = len(matrix) if contacts is None else len(contacts)
-    inverse = _floats("inverse_mass", inverse_mass)
+    inverse = floats("inverse_mass", inverse_mass)
     shapes = [(nv,), (count, nv), (count, nv, nv)]
     if inverse.shape not in shapes:
         raise _core.ProblemError(
             f"inverse_mass: has the shape {inverse.shape}, expected one of {shapes}"
         )
     of_each, full = inverse.ndim > 1, inverse.ndim == 3
-    moving = None if velocity is None else _shaped("velocity", velocity, (count, nv))
+    moving = None if velocity is None else shaped("velocity", velocity, (count, nv))
     sizes = None if contacts is None else spacedim * np.asarray(contacts)
     rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])
     if sizes is not None and len(matrix) != sizes.sum():
         raise _core.ProblemError(f"jacobian: has {len(matrix)} rows, expected {sizes.sum()}")
     if q is not None:
         if sizes is None:
-            q = _shaped("q", q, matrix.shape[:2])
+            q = shaped("q", q, matrix.shape[:2])
         else:
-            q = np.split(_shaped("q", _flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
+            q = np.split(shaped("q", flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
     found = [
         _device.local(
             one,
@@ -259,7 +383,7 @@ def _of_bodies(
     return matrices, velocities
 
 
-def _floats(name: str, values: Any) -> Floats:
+def floats(name: str, values: Any) -> Floats:
     """A contiguous array of numbers; no copy if it is one already."""
     try:
         array = np.asarray(values)
@@ -272,15 +396,15 @@ def _floats(name: str, values: Any) -> Floats:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def _shaped(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
-    array = _floats(name, values)
+def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
+    array = floats(name, values)
     if array.shape != shape:
         raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected {shape}")
     return array
 
 
-def _broadcast(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
-    array = _floats(name, values)
+def broadcast(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
+    array = floats(name, values)
     try:
         return np.ascontiguousarray(np.broadcast_to(array, shape))
     except ValueError:
@@ -295,7 +419,7 @@ def _sequence(name: str, values: Any) -> Any:
     return values
 
 
-def _flat(name: str, values: Any, sizes: npt.NDArray[Any]) -> Any:
+def flat(name: str, values: Any, sizes: npt.NDArray[Any]) -> Any:
     """The parts of a list one behind another, each of its size; an array as it is."""
     if not isinstance(values, (list, tuple)):
         return values
@@ -303,7 +427,7 @@ def _flat(name: str, values: Any, sizes: npt.NDArray[Any]) -> Any:
         raise _core.ProblemError(
             f"{name}: has {len(values)} problems, expected {len(sizes)} as there are contacts"
         )
-    parts = [_floats(name, one).reshape(-1) for one in values]
+    parts = [floats(name, one).reshape(-1) for one in values]
     for k, (part, size) in enumerate(zip(parts, sizes, strict=True)):
         if part.size != size and not (name == "mu" and part.size == 1):
             raise _core.ProblemError(

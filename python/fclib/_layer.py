@@ -5,6 +5,7 @@ It uses plain arrays; ``fclib.torch`` and ``fclib.jax`` connect it to their diff
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -12,10 +13,12 @@ import numpy.typing as npt
 
 from fclib import _core
 from fclib._batch import solve_batch
-from fclib._derivatives import vjp
-from fclib._registry import SolverError
+from fclib._batch_derivatives import jvp_batch, sensitivities_batch, vjp_batch
 
 Floats: TypeAlias = npt.NDArray[np.float64]
+Statuses: TypeAlias = npt.NDArray[np.int32]
+
+ONCE = "{}: has first derivatives only; a second derivative would have to go through its gradient"
 
 
 def check_shapes(
@@ -43,12 +46,10 @@ def check_shapes(
 
 def forward(
     W: Floats, q: Floats, mu: Floats, spacedim: int, tol: float, threads: int
-) -> tuple[Floats, Floats]:
-    """Find r and u of problems whose leading sizes are equal.
+) -> tuple[Floats, Floats, Statuses]:
+    """Find r and u of problems whose leading sizes are equal, and the status of each.
 
-    Raises:
-        SolverError: a problem of the batch was not solved; it names the first.
-        ProblemError: an entry is not finite, or mu is negative.
+    A problem that is not solved has NaN for r and u, so that nobody takes them for a solution.
     """
     m = q.shape[-1]
     found = solve_batch(
@@ -59,21 +60,77 @@ def forward(
         tol=tol,
         threads=threads,
     )
-    for k in np.flatnonzero(~found.converged)[:1]:
-        raise SolverError(
-            f"problem {k} of {len(found)}: {found.statuses[found.status[k]]}, error"
-            f" {found.error[k]:.1e}, and {tol:g} was asked for"
-        )
-    return found.r.reshape(q.shape), found.u.reshape(q.shape)
+    for array in (found.r, found.u):
+        array[~found.converged] = np.nan
+    return found.r.reshape(q.shape), found.u.reshape(q.shape), found.status.reshape(q.shape[:-1])
 
 
 def backward(
-    W: Floats, q: Floats, mu: Floats, r: Floats, spacedim: int, by_r: Floats, by_u: Floats
+    W: Floats,
+    q: Floats,
+    mu: Floats,
+    r: Floats,
+    spacedim: int,
+    by_r: Floats,
+    by_u: Floats,
+    threads: int,
 ) -> tuple[Floats, Floats, Floats]:
     """The derivatives of a loss by W, q and mu, from those by r and u."""
-    grad_W, grad_q, grad_mu = np.empty(W.shape), np.empty(q.shape), np.empty(mu.shape)
-    for k in np.ndindex(q.shape[:-1]):
-        problem = _core.LocalProblem(spacedim=spacedim, W=W[k], q=q[k], mu=mu[k])
-        found = vjp(problem, r[k], r=by_r[k], u=by_u[k])
-        grad_W[k], grad_q[k], grad_mu[k] = found.W, found.q, found.mu
-    return grad_W, grad_q, grad_mu
+    m = q.shape[-1]
+    found = vjp_batch(
+        W.reshape(-1, m, m),
+        q.reshape(-1, m),
+        mu.reshape(-1, m // spacedim),
+        r.reshape(-1, m),
+        r=by_r.reshape(-1, m),
+        u=by_u.reshape(-1, m),
+        spacedim=spacedim,
+        threads=threads,
+    )
+    return found.W.reshape(W.shape), found.q.reshape(q.shape), found.mu.reshape(mu.shape)
+
+
+def tangent(
+    W: Floats,
+    q: Floats,
+    mu: Floats,
+    r: Floats,
+    spacedim: int,
+    changes: Sequence[Floats | None],
+    threads: int,
+) -> tuple[Floats, Floats]:
+    """The changes of r and u, from those of W, q and mu."""
+    m = q.shape[-1]
+    sizes = ((m, m), (m,), (m // spacedim,))
+    dW, dq, dmu = (
+        None if one is None else one.reshape(-1, *own)
+        for one, own in zip(changes, sizes, strict=True)
+    )
+    found = jvp_batch(
+        W.reshape(-1, m, m),
+        q.reshape(-1, m),
+        mu.reshape(-1, m // spacedim),
+        r.reshape(-1, m),
+        dW=dW,
+        dq=dq,
+        dmu=dmu,
+        spacedim=spacedim,
+        threads=threads,
+    )
+    return found.r.reshape(q.shape), found.u.reshape(q.shape)
+
+
+def sensitivities(
+    W: Floats, q: Floats, mu: Floats, r: Floats, spacedim: int, threads: int
+) -> tuple[Floats, Floats]:
+    """The matrices of dr = by_q (dq + dW r) + by_mu dmu."""
+    m, nc = q.shape[-1], mu.shape[-1]
+    by_q, by_mu = sensitivities_batch(
+        W.reshape(-1, m, m),
+        q.reshape(-1, m),
+        mu.reshape(-1, nc),
+        r.reshape(-1, m),
+        spacedim,
+        threads,
+    )
+    return by_q.reshape(W.shape), by_mu.reshape(*q.shape, nc)

@@ -1,4 +1,4 @@
-"""Contact problems in JAX: for jit, vmap and grad.
+"""Contact problems in JAX: for jit, vmap, grad and jvp.
 
 >>> import fclib.jax
 >>> r, u = fclib.jax.solve(W, q, mu)
@@ -8,41 +8,53 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from fclib import _layer
+from fclib import _core, _layer
 
 __all__ = ["solve"]
 
 
 def solve(
-    W: Any, q: Any, mu: Any, *, spacedim: int = 3, tol: float = 1e-10, threads: int = 1
-) -> tuple[Any, Any]:
+    W: Any,
+    q: Any,
+    mu: Any,
+    *,
+    spacedim: int = 3,
+    tol: float = 1e-10,
+    threads: int = 1,
+    status: bool = False,
+) -> tuple[Any, ...]:
     """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
-    It is a callback of the host, with the derivative of ``fclib.vjp`` in reverse mode. Inside all
-    is computed in double precision. The result has the common type of W, q and mu, which is single
-    if ``jax_enable_x64`` is not set.
+    It is a callback of the host, with the derivatives of ``fclib.vjp`` and ``fclib.jvp``, but no
+    second ones. Inside all is computed in double precision. The result has the common type of W, q
+    and mu, which is single if ``jax_enable_x64`` is not set.
 
     W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
     arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
 
+    A problem that is not valid, has no solution or is not solved to tol has NaN for r and u, and
+    does not disturb the others. To leave such problems out of a loss, take
+    ``jnp.where((status == 0)[..., None], r, 0)``, and u likewise: their gradients are then zeros.
+
     Returns:
-        r and u, (..., m).
+        r and u, (..., m). With ``status``, also (...) places in ``fclib.BatchResult.statuses``; 0
+        is converged.
 
     Raises:
-        ProblemError: shapes do not agree. For errors inside the callback (wrong entries, problems
-            that are not solved) JAX raises its own errors.
+        ProblemError: shapes do not agree.
+        UnsuitableError: a second derivative is asked for.
     """
     W, q, mu = (jnp.asarray(one) for one in (W, q, mu))
     batch = _layer.check_shapes(W.shape, q.shape, mu.shape, spacedim)
     kind = jnp.result_type(W, q, mu, jnp.float32)
     m = q.shape[-1]
-    found: tuple[Any, Any] = _solve(
+    found: tuple[Any, ...] = _solve(
         spacedim,
         tol,
         threads,
@@ -50,39 +62,63 @@ def solve(
         jnp.broadcast_to(q.astype(kind), (*batch, m)),
         jnp.broadcast_to(mu.astype(kind), (*batch, m // spacedim)),
     )
-    return found
+    return found if status else found[:2]
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0, 1, 2))
-def _solve(spacedim: int, tol: float, threads: int, W: Any, q: Any, mu: Any) -> tuple[Any, Any]:
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1, 2))
+def _solve(spacedim: int, tol: float, threads: int, W: Any, q: Any, mu: Any) -> tuple[Any, ...]:
     shape = jax.ShapeDtypeStruct(q.shape, q.dtype)
+    statuses = jax.ShapeDtypeStruct(q.shape[:-1], np.int32)
 
     def call(*given: Any) -> tuple[Any, ...]:
         W, q, mu = _doubles(given)
-        found = _layer.forward(W, q, mu, spacedim, tol, threads)
-        return tuple(one.astype(shape.dtype) for one in found)
+        r, u, status = _layer.forward(W, q, mu, spacedim, tol, threads)
+        return r.astype(shape.dtype), u.astype(shape.dtype), status
 
-    found = jax.pure_callback(call, (shape, shape), W, q, mu, vmap_method="broadcast_all")
-    return found[0], found[1]
-
-
-def _forward(spacedim: int, tol: float, threads: int, W: Any, q: Any, mu: Any) -> tuple[Any, Any]:
-    found = _solve(spacedim, tol, threads, W, q, mu)
-    return found, (W, q, mu, found[0])
+    found = jax.pure_callback(call, (shape, shape, statuses), W, q, mu, vmap_method="broadcast_all")
+    return tuple(found)
 
 
-def _backward(spacedim: int, tol: float, threads: int, kept: Any, by: Any) -> Any:
-    shapes = tuple(jax.ShapeDtypeStruct(one.shape, one.dtype) for one in kept[:3])
+@_solve.defjvp  # type: ignore[untyped-decorator, unused-ignore]
+def _solve_jvp(spacedim: int, tol: float, threads: int, at: Any, change: Any) -> Any:
+    """The rest is products of matrices, which JAX transposes and maps by itself."""
+    W, q, mu = at
+    dW, dq, dmu = change
+    r, u, status = _solve(spacedim, tol, threads, W, q, mu)
+    by_q, by_mu = _sensitivities(spacedim, threads, W, q, mu, r)
+    # a problem without a solution, left out of a loss, must not make 0 times NaN
+    solved = (status == 0)[..., None]
+    r_or_zero = jnp.where(solved, r, 0)
+    W_or_zero = jnp.where(solved[..., None], W, 0)
+    moved = dq + _times(dW, r_or_zero)
+    dr = _times(by_q, moved) + _times(by_mu, dmu)
+    du = _times(W_or_zero, dr) + jnp.where(solved, moved, 0)
+    nothing = np.zeros(status.shape, dtype=jax.dtypes.float0)
+    return (r, u, status), (dr, du, nothing)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _sensitivities(spacedim: int, threads: int, W: Any, q: Any, mu: Any, r: Any) -> Any:
+    shapes = (
+        jax.ShapeDtypeStruct(W.shape, W.dtype),
+        jax.ShapeDtypeStruct((*q.shape, mu.shape[-1]), W.dtype),
+    )
 
     def call(*given: Any) -> tuple[Any, ...]:
-        W, q, mu, r, by_r, by_u = _doubles(given)
-        found = _layer.backward(W, q, mu, r, spacedim, by_r, by_u)
+        W, q, mu, r = _doubles(given)
+        found = _layer.sensitivities(W, q, mu, r, spacedim, threads)
         return tuple(one.astype(shapes[0].dtype) for one in found)
 
-    return jax.pure_callback(call, shapes, *kept, *by, vmap_method="broadcast_all")
+    return jax.pure_callback(call, shapes, W, q, mu, r, vmap_method="broadcast_all")
 
 
-_solve.defvjp(_forward, _backward)
+@_sensitivities.defjvp  # type: ignore[untyped-decorator, unused-ignore]
+def _no_second_derivative(spacedim: int, threads: int, at: Any, change: Any) -> NoReturn:
+    raise _core.UnsuitableError(_layer.ONCE.format("fclib.jax.solve"))
+
+
+def _times(matrix: Any, vector: Any) -> Any:
+    return jnp.einsum("...ij,...j->...i", matrix, vector)
 
 
 def _doubles(given: Any) -> list[Any]:

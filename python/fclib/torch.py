@@ -7,12 +7,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import torch
-from torch.autograd.function import once_differentiable
 
-from fclib import _layer
+from fclib import _core, _layer
 
 __all__ = ["solve"]
 
@@ -29,28 +28,50 @@ class _Solve(torch.autograd.Function):  # type: ignore[misc]
         spacedim: int,
         tol: float,
         threads: int,
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        r, u = _layer.forward(_array(W), _array(q), _array(mu), spacedim, tol, threads)
-        ctx.spacedim = spacedim
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        r, u, status = _layer.forward(_array(W), _array(q), _array(mu), spacedim, tol, threads)
+        ctx.options = (spacedim, threads)
         ctx.reactions = r
         ctx.save_for_backward(W, q, mu)
-        return torch.from_numpy(r).to(q), torch.from_numpy(u).to(q)
+        ctx.save_for_forward(W, q, mu)
+        statuses = torch.from_numpy(status).to(q.device)
+        ctx.mark_non_differentiable(statuses)
+        return torch.from_numpy(r).to(q), torch.from_numpy(u).to(q), statuses
 
     @staticmethod
-    @once_differentiable  # type: ignore[untyped-decorator, unused-ignore]
-    def backward(ctx: Any, by_r: torch.Tensor, by_u: torch.Tensor) -> tuple[Any, ...]:
+    def backward(ctx: Any, by_r: torch.Tensor, by_u: torch.Tensor, _: Any) -> tuple[Any, ...]:
         W, q, mu = ctx.saved_tensors
+        found = _Gradient.apply(W, q, mu, by_r, by_u, ctx.reactions, *ctx.options)
+        return (*found, None, None, None)
+
+    @staticmethod
+    def jvp(ctx: Any, dW: Any, dq: Any, dmu: Any, *_: Any) -> tuple[Any, ...]:
+        W, q, mu = ctx.saved_tensors
+        spacedim, threads = ctx.options
+        dr, du = _layer.tangent(
+            _array(W), _array(q), _array(mu), ctx.reactions, spacedim,
+            [None if one is None else _array(one) for one in (dW, dq, dmu)],
+            threads,
+        )  # fmt: skip
+        return torch.from_numpy(dr).to(q), torch.from_numpy(du).to(q), None
+
+
+class _Gradient(torch.autograd.Function):  # type: ignore[misc]
+    """The gradient, a function of its own, so that a second one is refused by name."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, W: Any, q: Any, mu: Any, by_r: Any, by_u: Any, r: Any, spacedim: int, threads: int
+    ) -> tuple[torch.Tensor, ...]:
+        del ctx
         found = _layer.backward(
-            _array(W),
-            _array(q),
-            _array(mu),
-            ctx.reactions,
-            ctx.spacedim,
-            _array(by_r),
-            _array(by_u),
+            _array(W), _array(q), _array(mu), r, spacedim, _array(by_r), _array(by_u), threads
         )
-        by_W, by_q, by_mu = (torch.from_numpy(one).to(q) for one in found)
-        return by_W, by_q, by_mu, None, None, None
+        return tuple(torch.from_numpy(one).to(q) for one in found)
+
+    @staticmethod
+    def backward(ctx: Any, *by: Any) -> NoReturn:
+        raise _core.UnsuitableError(_layer.ONCE.format("fclib.torch.solve"))
 
 
 def solve(
@@ -61,25 +82,32 @@ def solve(
     spacedim: int = 3,
     tol: float = 1e-10,
     threads: int = 1,
-) -> tuple[torch.Tensor, torch.Tensor]:
+    status: bool = False,
+) -> Any:
     """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
-    The gradient is that of ``fclib.vjp``; there is no second one. All is computed in double
-    precision on the CPU, and returned in the type and on the device of q.
+    The gradient is that of ``fclib.vjp_batch``, and in forward mode of ``fclib.jvp_batch``; there
+    is no second one. All is computed in double precision on the CPU, and returned in the type and
+    on the device of q.
 
     W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
     arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
 
+    A problem that is not valid, has no solution or is not solved to tol has NaN for r and u, and
+    does not disturb the others. To leave such problems out of a loss, take
+    ``torch.where((status == 0)[..., None], r, 0)``, and u likewise: their gradients are then zeros.
+
     Returns:
-        r and u, (..., m).
+        r and u, (..., m). With ``status``, also (...) places in ``fclib.BatchResult.statuses``; 0
+        is converged.
 
     Raises:
-        ProblemError: as there; or shapes do not agree.
-        SolverError: a problem was not solved to the tolerance, or has no solution.
+        ProblemError: shapes do not agree.
+        UnsuitableError: a second derivative is asked for.
     """
     batch = _layer.check_shapes(tuple(W.shape), tuple(q.shape), tuple(mu.shape), spacedim)
     m = q.shape[-1]
-    return _Solve.apply(  # type: ignore[no-any-return, no-untyped-call, unused-ignore]
+    r, u, statuses = _Solve.apply(  # type: ignore[no-untyped-call, unused-ignore]
         W.expand(*batch, m, m),
         q.expand(*batch, m),
         mu.expand(*batch, m // spacedim),
@@ -87,6 +115,7 @@ def solve(
         tol,
         threads,
     )
+    return (r, u, statuses) if status else (r, u)
 
 
 def _array(tensor: torch.Tensor) -> Any:

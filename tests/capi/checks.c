@@ -459,7 +459,7 @@ static void solving(void) {
   CHECK(result.status == FCLIB_CONVERGED && result.error <= 1e-8 && result.iterations > 0);
   const char* names[] = {"converged",  "iteration_limit", "time_limit", "diverged",
                          "inaccurate", "interrupted",     "stalled",    "infeasible"};
-  for (int k = 0; k <= FCLIB_INFEASIBLE; k++)
+  for (int k = 0; k <= FCLIB_INVALID; k++)
     CHECK(!strcmp(fclib_status_name((enum fclib_status)k), names[k]));
   CHECK(!strcmp(fclib_status_name((enum fclib_status)99), "unknown"));
   CHECK(fabs(r_[1] + 0.5) < 1e-8 && fabs(u_[1] - 1.5) < 1e-8);

@@ -32,7 +32,7 @@ def test_each_is_solved_and_judged_by_the_merit(nc: int, spacedim: int) -> None:
     for k in range(60):
         problem = fclib.LocalProblem(spacedim=spacedim, W=W[k], q=q[k], mu=mu[k])
         merit = fclib.merit(problem, fclib.Solution(r=found.r[k], u=found.u[k]))
-        assert merit.error == pytest.approx(found.error[k], rel=1e-9, abs=1e-15)
+        assert merit.error <= found.error[k] <= merit.error + 1e-3 * 1e-8
         assert merit.error <= 1e-8
 
 
@@ -78,14 +78,10 @@ def test_what_is_not_finished_goes_the_whole_way() -> None:
 
 def test_wrong_input_is_refused_by_its_name() -> None:
     W, q, mu = problems(2, 4)
-    bad = mu.copy()
-    bad[3, 1] = -0.1
     for arguments, words in [
-        ((W, q, bad), "problem 3: mu: contact 1"),
         ((W, q, mu[:, :1].T), "mu: has the shape"),
         ((W, q[:3], mu), r"q: has the shape \(3, 6\)"),
         ((W[0], q, mu), "W: has the shape"),
-        ((np.where(W > 1, np.nan, W), q, mu), "W: has an entry that is not finite"),
         ((W.astype(complex), q, mu), "W: is not an array of real numbers"),
     ]:
         with pytest.raises(fclib.ProblemError, match=words):
@@ -96,6 +92,272 @@ def test_wrong_input_is_refused_by_its_name() -> None:
         fclib.solve_batch(W, q, mu, time_limit=0)
     with pytest.raises(fclib.ProblemError, match="q: has 3 problems, expected 4"):
         fclib.solve_batch(W.ravel(), list(q[:3]), mu, contacts=[2] * 4)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_bad_problem_has_its_status_and_hurts_no_other(threads: int) -> None:
+    W, q, mu = problems(2, 200)
+    good = fclib.solve_batch(W, q, mu)
+    mu = mu.copy()
+    mu[3, 1] = -0.1
+    W[70, 2, 2] = np.nan
+    q[150, 0] = np.inf
+    found = fclib.solve_batch(W, q, mu, threads=threads)
+    bad = found.status == found.statuses.index("invalid")
+    assert np.flatnonzero(bad).tolist() == [3, 70, 150]
+    assert found.wrong.startswith("problem 3: mu: contact 1 has -0.1")
+    assert np.isnan(found.r[bad]).all()
+    assert np.isnan(found.u[bad]).all()
+    assert np.isinf(found.error[bad]).all()
+    assert np.array_equal(found.r[~bad], good.r[~bad])
+    assert good.wrong == ""
+
+
+def test_edges() -> None:
+    none = fclib.solve_batch(np.empty((0, 6, 6)), np.empty((0, 6)), np.empty((0, 2)))
+    assert len(none) == 0
+    assert repr(none) == "<BatchResult: 0 of 0 converged, worst error 0.0e+00>"
+    empty = fclib.solve_batch([np.empty((0, 0)), np.eye(3)], [[], [-1, 0, 0]], [[], [0]])
+    assert empty.converged.all()
+    assert empty.r.tolist() == [1, 0, 0]
+    no_contact = fclib.solve_batch(np.empty((2, 0, 0)), np.empty((2, 0)), np.empty((2, 0)))
+    assert no_contact.converged.all()
+
+
+def islands(count: int, seed: int = 0) -> tuple[Any, Any, Any, Any]:
+    """Six contacts in three islands of two, which are not in a row, and the pattern of W."""
+    rng = np.random.default_rng(seed)
+    near = np.equal.outer(np.arange(6) % 3, np.arange(6) % 3)
+    h = rng.normal(size=(count, 21, 18)) * np.kron(
+        np.equal.outer(np.arange(21) % 3, np.arange(6) % 3), np.ones(3)
+    )
+    W = np.einsum("kij,kil->kjl", h, h)
+    starts = np.arange(0, 13, 2)
+    return (
+        W,
+        rng.normal(size=(count, 18)),
+        rng.uniform(0, 1, (count, 6)),
+        (
+            starts,
+            np.nonzero(near)[1],
+        ),
+    )
+
+
+def test_w_by_blocks_is_the_same_problem() -> None:
+    sp = pytest.importorskip("scipy.sparse")
+    W, q, mu, pattern = islands(40)
+    dense = fclib.solve_batch(W, q, mu)
+    blocks = W.reshape(40, 6, 3, 6, 3).swapaxes(2, 3)
+    near = np.equal.outer(np.arange(6) % 3, np.arange(6) % 3)
+    shared = fclib.solve_batch(blocks[:, near], q, mu, pattern=pattern)
+    assert np.array_equal(dense.r, shared.r)
+    assert np.array_equal(dense.error, shared.error)
+    for convert in (sp.csr_array, sp.csc_matrix, sp.bsr_array):
+        each = fclib.solve_batch([convert(one) for one in W], list(q), list(mu), threads=2)
+        assert np.array_equal(dense.r.ravel(), each.r)
+    # problems of other sizes and patterns between them
+    mixed = fclib.solve_batch(
+        [sp.csr_array(W[0]), sp.csr_array((0, 0)), sp.csr_array(W[1][:3, :3]), sp.csr_array(W[1])],
+        [q[0], [], q[1][:3], q[1]],
+        [mu[0], [], mu[1][:1], mu[1]],
+    )
+    assert mixed.converged.all()
+    assert np.array_equal(mixed.r[:18], dense.r[0])
+    assert np.array_equal(mixed.r[21:], dense.r[1])
+
+
+def test_islands_do_not_disturb_each_other() -> None:
+    W, q, mu, _ = islands(30, seed=1)
+    q[:, 0:3] *= 1e-6  # one of slow contacts
+    q[:, 9:12] *= 1e-6
+    found = fclib.solve_batch(W, q, mu, tol=1e-10)
+    assert found.converged.all()
+    for k in range(30):
+        problem = fclib.LocalProblem(W=W[k], q=q[k], mu=mu[k])
+        assert fclib.merit(problem, fclib.Solution(r=found.r[k])).error <= 1e-10
+        ones = [np.r_[3 * a : 3 * a + 3, 3 * a + 9 : 3 * a + 12] for a in range(3)]
+        for a, at in enumerate(ones):
+            alone = fclib.solve_batch(W[k][np.ix_(at, at)][None], q[k][None, at], mu[k][None, a::3])
+            assert alone.converged.all()
+            np.testing.assert_allclose(alone.u[0], found.u[k][at], atol=1e-7 * np.abs(q[k]).max())
+
+
+def test_wrong_patterns_are_refused_by_their_name() -> None:
+    W, q, mu, (starts, columns) = islands(2)
+    blocks = np.zeros((2, 12, 3, 3))
+    for arguments, words in [
+        ({"pattern": (starts,)}, r"pattern: is not \(starts, columns\)"),
+        ({"pattern": (starts, columns[1:])}, "pattern: the last of starts"),
+        ({"pattern": (starts * 1.0, columns)}, "pattern: starts is not a list of whole numbers"),
+        ({"pattern": (starts, columns), "contacts": [6, 6]}, "pattern: is for problems with"),
+        ({"pattern": (starts[[0, 2, 1, 3, 4, 5, 6]], columns)}, "starts: problem 0"),
+    ]:
+        with pytest.raises(fclib.ProblemError, match=words):
+            fclib.solve_batch(blocks, q, mu, **arguments)
+    with pytest.raises(
+        fclib.ProblemError, match=r"W: has the shape .* expected \(count, 12, 3, 3\)"
+    ):
+        fclib.solve_batch(W, q, mu, pattern=(starts, columns))
+    found = fclib.solve_batch(blocks, q, mu, pattern=(starts, columns + 1))
+    assert found.wrong == "problem 0: W: has a block whose column is out of range"
+
+
+def global_problems(count: int, seed: int = 0) -> tuple[Any, Any, Any, Any, Any]:
+    """Two bodies that do not touch, one with a full inertia, two contacts each."""
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(count, 6, 6))
+    M = np.zeros((count, 12, 12))
+    M[:, :6, :6] = np.einsum("kij,klj->kil", a, a) + np.eye(6)
+    M[:, 6:, 6:] = 2 * np.eye(6)
+    H = np.zeros((count, 12, 12))
+    H[:, :6, :6], H[:, 6:, 6:] = rng.normal(size=(2, count, 6, 6))
+    return (
+        M,
+        H,
+        rng.normal(size=(count, 12)),
+        rng.normal(size=(count, 12)),
+        rng.uniform(0, 1, (count, 4)),
+    )
+
+
+def test_global_problems_as_simulators_hold_them() -> None:
+    M, H, f, w, mu = global_problems(50)
+    found = fclib.solve_batch_global(M, H, f, mu, w=w, threads=2)
+    assert found.converged.all()
+    assert found.by_auto == 0
+    assert found.v is not None
+    for k in range(50):
+        problem = fclib.GlobalProblem(M=M[k], H=H[k], f=f[k], w=w[k], mu=mu[k])
+        merit = fclib.merit(problem, fclib.Solution(r=found.r[k], u=found.u[k], v=found.v[k]))
+        assert merit.error <= found.error[k] * (1 + 1e-6)
+        assert found.error[k] <= 1e-8
+        assert merit.dynamics <= 1e-12
+    # a simulator's Jacobian, by rows, is not copied to another one
+    J = np.ascontiguousarray(H.swapaxes(1, 2))
+    again = fclib.solve_batch_global(M, J.swapaxes(1, 2), f, mu, w=w)
+    assert np.array_equal(found.r, again.r)
+    # of different sizes
+    lists = fclib.solve_batch_global(
+        [M[0], M[1][:6, :6], np.empty((0, 0))],
+        [H[0], H[1][:6, :3], np.empty((0, 0))],
+        [f[0], f[1][:6], []],
+        [mu[0], mu[1][:1], []],
+    )
+    assert lists.converged.all()
+    assert lists.offsets is not None
+    assert lists.offsets.tolist() == [0, 12, 15, 15]
+    assert lists.v is not None
+    assert lists.v.shape == (18,)
+
+
+def test_bad_global_problems_are_named() -> None:
+    M, H, f, _, mu = global_problems(4)
+    M[1, 0, 0] = -1
+    f[2, 3] = np.nan
+    found = fclib.solve_batch_global(M, H, f, mu)
+    assert found.wrong == "problem 1: M: is not positive definite"
+    assert [found.statuses[k] for k in found.status[[0, 1, 2, 3]]] == [
+        "converged", "invalid", "invalid", "converged",
+    ]  # fmt: skip
+    for arguments, words in [
+        ((M[0], H, f, mu), "M: has the shape"),
+        ((M, H[:, :5], f, mu), "H: has the shape"),
+        ((M, H, f[:, :5], mu), "f: has the shape"),
+        ((list(M), H, f, mu), "H: is not a list of 4 problems, as M is"),
+        ((list(M), [one[:5] for one in H], list(f), list(mu)), "H: problem 0 has the shape"),
+    ]:
+        with pytest.raises(fclib.ProblemError, match=words):
+            fclib.solve_batch_global(*arguments)
+
+
+def test_what_bodies_do_not_finish_goes_the_whole_way() -> None:
+    # two walls approach: no velocity of the body satisfies both
+    H = np.array([[[1.0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]]])
+    w = np.array([[-1.0, 0, 0, -1, 0, 0]])
+    found = fclib.solve_batch_global(np.eye(3)[None], H, np.zeros((1, 3)), 0.5, w=w)
+    assert found.by_auto == 1
+    assert found.statuses[found.status[0]] == "infeasible"
+
+
+def planted(nc: int, count: int, seed: int) -> tuple[Any, Any, Any, Any, Any]:
+    """Problems with known r and u, all three statuses, mu = 0, and masses of all sizes."""
+    rng = np.random.default_rng(seed)
+    size = np.repeat(10.0 ** rng.uniform(-3, 3, (count, nc)), 3, axis=1)
+    h = rng.normal(size=(count, 3 * nc + 2, 3 * nc)) * size[:, None, :]
+    W = np.einsum("kij,kil->kjl", h, h)
+    mu = rng.uniform(0, 1, (count, nc)) * (rng.random((count, nc)) > 0.2)
+    kind = rng.integers(0, 3, (count, nc))
+    angle = rng.uniform(0, 2 * np.pi, (count, nc))
+    along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    normal = np.where(kind == 0, 0, rng.uniform(0.5, 2, (count, nc)))
+    part = np.where(kind == 1, rng.uniform(0, 0.9, (count, nc)), 1) * mu * normal
+    r = np.concatenate([normal[..., None], part[..., None] * along], axis=-1)
+    speed = np.where(kind == 2, rng.uniform(0.1, 1, (count, nc)), 0)
+    u = np.concatenate([np.where(kind == 0, 1.0, 0)[..., None], -speed[..., None] * along], axis=-1)
+    u[..., 1:] += np.where(kind == 0, 0.3, 0)[..., None]
+    r = r.reshape(count, -1) / size
+    u = u.reshape(count, -1) * size
+    return W, u - np.einsum("kij,kj->ki", W, r), mu, r, u
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-8])
+def test_planted_answers_with_masses_of_all_sizes(tol: float) -> None:
+    W, q, mu, r, _ = planted(4, 300, seed=2)
+    found = fclib.solve_batch(W, q, mu, tol=tol)
+    assert found.converged.all()
+    for k in range(0, 300, 10):
+        problem = fclib.LocalProblem(W=W[k], q=q[k], mu=mu[k])
+        assert fclib.merit(problem, fclib.Solution(r=r[k])).error <= 1e-8
+        error = fclib.merit(problem, fclib.Solution(r=found.r[k], u=found.u[k])).error
+        assert error <= found.error[k] <= tol
+
+
+def test_derivatives_of_a_batch_are_those_of_each() -> None:
+    W, q, mu, _, _ = planted(3, 25, seed=4)
+    r = fclib.solve_batch(W, q, mu, tol=1e-13).r
+    rng = np.random.default_rng(0)
+    by_r, by_u, dq = rng.normal(size=(3, *q.shape))
+    dW, dmu = rng.normal(size=W.shape), rng.normal(size=mu.shape)
+    gradient = fclib.vjp_batch(W, q, mu, r, r=by_r, u=by_u, threads=2)
+    tangent = fclib.jvp_batch(W, q, mu, r, dW=dW, dq=dq, dmu=dmu)
+    compared = 0
+    for k in range(25):
+        problem = fclib.LocalProblem(W=W[k], q=q[k], mu=mu[k])
+        one = fclib.vjp(problem, r[k], r=by_r[k], u=by_u[k])
+        assert np.array_equal(one.degenerate, gradient.degenerate[k])
+        if one.degenerate.any():
+            continue  # either of two
+        compared += 1
+        assert one.unique == gradient.unique[k] == tangent.unique[k]
+        for name in ("W", "q", "mu"):
+            own = getattr(one, name)
+            np.testing.assert_allclose(
+                getattr(gradient, name)[k], own, rtol=1e-6, atol=1e-8 * np.abs(own).max()
+            )
+        other = fclib.jvp(problem, r[k], W=dW[k], q=dq[k], mu=dmu[k])
+        for name in ("r", "u"):
+            own = getattr(other, name)
+            np.testing.assert_allclose(
+                getattr(tangent, name)[k], own, rtol=1e-6, atol=1e-8 * np.abs(own).max()
+            )
+    assert compared > 10
+
+
+def test_right_hand_sides_share_a_call() -> None:
+    W, q, mu, _, _ = planted(2, 5, seed=5)
+    r = fclib.solve_batch(W, q, mu, tol=1e-12).r
+    weights = np.random.default_rng(0).normal(size=(5, 3, 6))
+    many = fclib.vjp_batch(W, q, mu, r, r=weights)
+    assert many.W.shape == (5, 3, 6, 6)
+    changes = fclib.jvp_batch(W, q, mu, r, dq=weights)
+    for k in range(3):
+        assert np.array_equal(fclib.vjp_batch(W, q, mu, r, r=weights[:, k]).q, many.q[:, k])
+        assert np.array_equal(fclib.jvp_batch(W, q, mu, r, dq=weights[:, k]).u, changes.u[:, k])
+    with pytest.raises(fclib.ProblemError, match="u: has the shape"):
+        fclib.vjp_batch(W, q, mu, r, r=weights, u=weights[:, :2])
+    with pytest.raises(fclib.ProblemError, match="W: has the shape"):
+        fclib.vjp_batch(W[0], q, mu, r, r=weights)
 
 
 def test_a_limit_of_time_leaves_the_rest_with_their_merit() -> None:

@@ -43,6 +43,13 @@ def test_look(root: Path, tmp_path: Path) -> None:
     assert fclib.read(tmp_path / "stack.hdf5").nc == 40
 
 
+def test_mass_and_friction_of_a_cube_in_many_worlds(root: Path, tmp_path: Path) -> None:
+    last = run(root, tmp_path, "worlds.py").splitlines()[-2]
+    mass, mu = (float(number) for number in re.findall(r"(?:mass|mu) ([\d.]+)", last))
+    assert abs(mass - 1.7) < 0.01
+    assert abs(mu - 0.35) < 0.005
+
+
 def test_five_solvers_converge(root: Path, tmp_path: Path) -> None:
     output = run(root, tmp_path, "convergence.py")
     lines = [line.split() for line in output.splitlines()[1:]]

@@ -28,11 +28,11 @@ def test_the_gradient_is_that_of_differences(d: int) -> None:
     by_r, by_u = weights(q.shape)
 
     def loss(W: Any, q: Any, mu: Any) -> float:
-        r, u = _layer.forward(W, q, mu, d, 1e-13, 1)
+        r, u, _ = _layer.forward(W, q, mu, d, 1e-13, 1)
         return float((by_r * r).sum() + (by_u * u).sum())
 
-    r, _ = _layer.forward(W, q, mu, d, 1e-13, 1)
-    found = _layer.backward(W, q, mu, r, d, by_r, by_u)
+    r, _, _ = _layer.forward(W, q, mu, d, 1e-13, 1)
+    found = _layer.backward(W, q, mu, r, d, by_r, by_u, 1)
     rng = np.random.default_rng(2)
     for place, (value, gradient) in enumerate(zip((W, q, mu), found, strict=True)):
         change = rng.normal(size=value.shape)
@@ -46,7 +46,7 @@ def test_the_gradient_is_that_of_differences(d: int) -> None:
         assert (gradient * change).sum() == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
-def test_wrong_shapes_and_unsolved_problems_are_named() -> None:
+def test_wrong_shapes_are_named() -> None:
     shapes = _layer.check_shapes
     assert shapes((6, 6), (4, 6), (2,), 3) == (4,)
     with pytest.raises(fclib.ProblemError, match=r"mu: has the shape \(3,\), expected \(..., 2\)"):
@@ -57,9 +57,44 @@ def test_wrong_shapes_and_unsolved_problems_are_named() -> None:
         shapes((2, 6, 6), (3, 6), (2,), 3)
     with pytest.raises(fclib.ProblemError, match=r"q: has the shape \(5,\)"):
         shapes((5, 5), (5,), (1,), 3)
-    W = np.stack([np.eye(3), np.zeros((3, 3))])
-    with pytest.raises(fclib.SolverError, match="problem 1 of 2: infeasible"):
-        _layer.forward(W, np.full((2, 3), -1.0), np.full((2, 1), 0.5), 3, 1e-10, 1)
+
+
+def worlds_with_bad_ones() -> tuple[Any, Any, Any]:
+    """One that is solved, one without a solution, one that is no problem, one that is solved."""
+    W = np.stack([np.eye(3), np.zeros((3, 3)), np.eye(3), 2 * np.eye(3)])
+    q = np.array([[-1, 0.1, 0], [-1, 0, 0], [np.nan, 0, 0], [-1, 0, 3.0]])
+    return W, q, np.full((4, 1), 0.5)
+
+
+def test_a_bad_world_has_its_status_and_hurts_no_other() -> None:
+    W, q, mu = worlds_with_bad_ones()
+    r, u, status = _layer.forward(W, q, mu, 3, 1e-10, 1)
+    names = [fclib.BatchResult.statuses[k] for k in status]
+    assert names == ["converged", "infeasible", "invalid", "converged"]
+    assert np.isnan(r[1:3]).all()
+    assert np.isnan(u[1:3]).all()
+    good = [0, 3]
+    alone, _, _ = _layer.forward(W[good], q[good], mu[good], 3, 1e-10, 1)
+    assert np.array_equal(r[good], alone)
+    # left out of a loss, they have no gradient; asked for one, they say that there is none
+    by = np.ones((4, 3))
+    by[1:3] = 0
+    found = _layer.backward(W, q, mu, r, 3, by, by, 1)
+    for one in found:
+        assert (one[1:3] == 0).all()
+        assert np.isfinite(one).all()
+    assert np.isnan(_layer.backward(W, q, mu, r, 3, np.ones((4, 3)), by, 1)[1][1:3]).all()
+
+
+def test_a_whole_batch_has_no_loop_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A call of the core for all of them, whatever their number."""
+    calls = []
+    own = fclib._core.vjp_batch
+    monkeypatch.setattr(fclib._core, "vjp_batch", lambda *a, **k: (calls.append(1), own(*a, **k)))
+    W, q, mu = (np.concatenate([one] * 40) for one in batch(count=3, nc=2))
+    r, _, _ = _layer.forward(W, q, mu, 3, 1e-12, 2)
+    _layer.backward(W, q, mu, r, 3, *weights(q.shape), 2)
+    assert len(calls) == 1
 
 
 def test_torch_agrees_with_differences() -> None:
@@ -85,6 +120,40 @@ def test_torch_agrees_with_differences() -> None:
         fclib.torch.solve(W, q, mu[:, :1])
 
 
+def test_torch_masks_bad_worlds_and_refuses_a_second_derivative() -> None:
+    torch = pytest.importorskip("torch")
+    import fclib.torch
+
+    W, q, mu = (torch.tensor(one, requires_grad=True) for one in worlds_with_bad_ones())
+    r, u, status = fclib.torch.solve(W, q, mu, status=True)
+    assert status.tolist() == [0, 7, 8, 0]
+    r, u = (torch.where((status == 0)[:, None], one, 0) for one in (r, u))
+    loss = (r * r + u).sum()
+    by = torch.autograd.grad(loss, (W, q, mu), create_graph=True)
+    for one in by:
+        assert torch.isfinite(one).all()
+        assert (one[1:3] == 0).all()
+        assert (one[0] != 0).any() or (one[3] != 0).any()
+    with pytest.raises(fclib.UnsuitableError, match=r"fclib\.torch\.solve: has first derivatives"):
+        torch.autograd.grad(by[1].sum(), q)
+    # forward mode
+    given = [torch.tensor(one) for one in batch(count=2, nc=2)]
+    change = [
+        torch.tensor(np.random.default_rng(k).normal(size=g.shape)) for k, g in enumerate(given)
+    ]
+    with torch.autograd.forward_ad.dual_level():
+        dual = [
+            torch.autograd.forward_ad.make_dual(g, c) for g, c in zip(given, change, strict=True)
+        ]
+        _, u = fclib.torch.solve(*dual, tol=1e-13)
+        du = torch.autograd.forward_ad.unpack_dual(u).tangent
+    sides = [
+        fclib.torch.solve(*(g + s * c for g, c in zip(given, change, strict=True)), tol=1e-13)[1]
+        for s in (1e-6, -1e-6)
+    ]
+    torch.testing.assert_close(du, (sides[0] - sides[1]) / 2e-6, rtol=1e-4, atol=1e-4)
+
+
 def test_jax_agrees_with_differences() -> None:
     jax = pytest.importorskip("jax")
     check_grads = pytest.importorskip("jax.test_util").check_grads
@@ -99,7 +168,7 @@ def test_jax_agrees_with_differences() -> None:
         return (r * u).sum() + (u**2).sum() + r.sum()
 
     check_grads(
-        jax.jit(loss), (half, q, mu), order=1, modes=["rev"], eps=1e-6, atol=1e-4, rtol=1e-4
+        jax.jit(loss), (half, q, mu), order=1, modes=["rev", "fwd"], eps=1e-6, atol=1e-4, rtol=1e-4
     )
     # vmap goes through as one batch, and grad through vmap
     whole = jax.grad(loss, argnums=(0, 1, 2))(half, q, mu)
@@ -110,3 +179,40 @@ def test_jax_agrees_with_differences() -> None:
     assert r.shape == q.shape
     with pytest.raises(fclib.ProblemError, match="mu: has the shape"):
         fclib.jax.solve(W, q, mu[:, :1])
+
+
+def test_jax_masks_bad_worlds_and_refuses_a_second_derivative() -> None:
+    jax = pytest.importorskip("jax")
+    import jax.numpy as jnp
+
+    import fclib.jax
+
+    jax.config.update("jax_enable_x64", True)
+
+    def loss(W: Any, q: Any, mu: Any) -> Any:
+        r, u, status = fclib.jax.solve(W, q, mu, status=True)
+        r, u = (jnp.where((status == 0)[..., None], one, 0) for one in (r, u))
+        return (r * r + u).sum()
+
+    W, q, mu = worlds_with_bad_ones()
+    by = jax.jit(jax.grad(loss, argnums=(0, 1, 2)))(W, q, mu)
+    for one in by:
+        assert np.isfinite(one).all()
+        assert (one[1:3] == 0).all()
+        assert (one[0] != 0).any() or (one[3] != 0).any()
+    statuses = jax.vmap(lambda *one: fclib.jax.solve(*one, status=True)[2])(W, q, mu)
+    assert statuses.tolist() == [0, 7, 8, 0]
+    with pytest.raises(fclib.UnsuitableError, match=r"fclib\.jax\.solve: has first derivatives"):
+        jax.grad(lambda q: jax.grad(loss, argnums=1)(W, q, mu)[0].sum())(q)
+    # the change of one direction, of all directions at once, and by differences
+    W, q, mu = batch(count=2, nc=2)
+    change = np.random.default_rng(0).normal(size=q.shape)
+
+    def velocity(q: Any) -> Any:
+        return fclib.jax.solve(W, q, mu, tol=1e-13)[1]
+
+    _, du = jax.jvp(velocity, (q,), (change,))
+    jacobian = jax.jacfwd(velocity)(q)
+    np.testing.assert_allclose(jnp.einsum("kiln,ln->ki", jacobian, change), du, atol=1e-9)
+    differences = (velocity(q + 1e-6 * change) - velocity(q - 1e-6 * change)) / 2e-6
+    np.testing.assert_allclose(du, differences, rtol=1e-4, atol=1e-4)

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <vector>
+
 #include "counted_allocations.hpp"
 #include "falling_spheres.hpp"
+#include "random_problems.hpp"
 #include "solve/driver.hpp"
 
 namespace fclib {
@@ -73,6 +77,55 @@ TEST(Workspace, KnowsContactsByTheirNames) {
   workspace.forget();
   workspace.guess(2, names, r);
   EXPECT_EQ(r, (std::vector<double>(4, 0.0)));
+}
+
+TEST(Workspace, APatternIsKnownAgain) {
+  // two islands, in four storages; entries of a triplet add up
+  testing::RandomData random(3);
+  Eigen::MatrixXd W = Eigen::MatrixXd::Zero(12, 12);
+  const auto fill = [&] {
+    for (const Index at : {0, 6}) {
+      Eigen::MatrixXd h(8, 6);
+      for (Eigen::Index j = 0; j < 6; ++j) h.col(j) = random.vector(8);
+      W.block<6, 6>(at, at) = h.transpose() * h;
+    }
+  };
+  for (const Storage storage : {Storage::triplet, Storage::csc, Storage::csr, Storage::dense}) {
+    Workspace kept;
+    for (int k = 0; k < 4; ++k) {
+      fill();
+      LocalProblem problem;
+      problem.spacedim = 3;
+      problem.W = Matrix::from_eigen(SparseColumns(W.sparseView()));
+      if (storage == Storage::triplet) {
+        problem.W = converted(problem.W, Storage::triplet);
+        problem.W.x[0] -= 1;
+        problem.W.i.push_back(problem.W.i[0]);
+        problem.W.p.push_back(problem.W.p[0]);
+        problem.W.x.push_back(1);
+      } else {
+        problem.W = converted(problem.W, storage);
+      }
+      problem.q = random.vector(12);
+      problem.mu = Vector::Constant(4, 0.3);
+      if (k == 3) {  // another pattern of the same size: one island
+        for (Index a = 0; a < 12; ++a) W(a, (a + 6) % 12) = a % 3 == 0 ? 0.1 : 0.0;
+        problem.W = converted(Matrix::from_eigen(SparseColumns(W.sparseView())), storage);
+      }
+      kept.forget();
+      const Workspace::Answer again = kept.solve(LocalView(problem), {}, {});
+      const std::vector<double> r(again.r.begin(), again.r.end());
+      Workspace fresh;
+      const Workspace::Answer first = fresh.solve(LocalView(problem), {}, {});
+      EXPECT_EQ(again.status, Status::converged);
+      EXPECT_EQ(r, std::vector<double>(first.r.begin(), first.r.end()));
+      Solution solution;
+      solution.r = Eigen::Map<const Vector>(r.data(), 12);
+      EXPECT_NEAR(merit(problem, solution).error, again.error, 1e-15);
+      problem.W.x[0] = std::numeric_limits<double>::quiet_NaN();
+      EXPECT_THROW(kept.solve(LocalView(problem), {}, {}), Error);
+    }
+  }
 }
 
 TEST(Workspace, RefusesWhatIsWrong) {

@@ -395,8 +395,7 @@ def in_turn(problem: Any, number: int, solver: str) -> str:
     takers = [
         one.name
         for one in fclib.solvers()
-        if one.origin == "fclib"
-        and problem.spacedim in _registry.dimensions_of(one, problem.kind)
+        if one.origin == "fclib" and problem.spacedim in _registry.dimensions_of(one, problem.kind)
     ]
     return takers[number % len(takers)]
 

@@ -1157,7 +1157,7 @@ class Solver {
                          const double* const (&limits)[Law::groups], const double* guess,
                          const Result& result) {
     const Group& group = system.group;
-    double size[Own];
+    double size[Own] = {};
     bool bad = system.take(mine, nc, given, q_, size);
     double sums[4] = {0, 0, 0, 0};  // of the sizes, their number, bad entries, contacts that close
     if (mine) {
@@ -1198,7 +1198,7 @@ class Solver {
         FCLIB_UNROLL
         for (int k = 0; k < D; ++k) {
           square += q_[o][k] * q_[o][k];
-          if (sums[2] > 0 || sums[3] == 0) r_[o][k] = 0;  // bad, or all contacts open
+          if (sums[3] == 0) r_[o][k] = 0;  // all contacts are open
         }
         squares[0] += square;
         squares[1] += rho_[o] * rho_[o] * square;
@@ -1216,7 +1216,12 @@ class Solver {
       state_ = State::begun;
       if (sums[2] > 0) {
         answer_.ending = Ending::invalid;
-        copy(r_, u_);  // zero
+        FCLIB_UNROLL
+        for (int o = 0; o < Own; ++o) {
+          FCLIB_UNROLL
+          for (int k = 0; k < D; ++k) r_[o][k] = FCLIB_INFINITY - FCLIB_INFINITY;  // NaN
+        }
+        copy(r_, u_);
         write();
       }
     }
@@ -1249,7 +1254,7 @@ class Solver {
   };
 
   FCLIB_LANES void judge_candidate(bool mine) {
-    Vectors x, ux;
+    Vectors x{}, ux{};
     FCLIB_UNROLL
     for (int o = 0; o < Own; ++o) {
       if (system.group.lane() + o * Group::size >= system.nc) break;
@@ -1304,7 +1309,7 @@ class Solver {
     group.sum(sums);
     const double norm = square_root(sums[0]);
     if (inner_ == 0) first_ = norm;
-    Vectors x, ux;
+    Vectors x{}, ux{};
     system.solve(x);
     FCLIB_UNROLL
     for (int o = 0; o < Own; ++o) {

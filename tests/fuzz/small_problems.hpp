@@ -25,6 +25,8 @@ P small_problem(Index d, Index nc, bool mixed, Storage storage) {
         return mixed ? 2 : 0;
       case Dim::nc:
         return nc;
+      case Dim::nr:
+        return d == 6 ? nc : 0;
     }
     return 0;
   };

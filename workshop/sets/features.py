@@ -18,8 +18,9 @@ Array = npt.NDArray[np.float64]
 DENSE: Final = 1500  # largest number of contact components for which W's spectrum is found
 # Distance in the space of features below which two problems are nearly the same. Of 630 pairs of
 # neighbours nearer than 0.05, among 1,762 problems of 48 families, all but 7 are steps of one
-# simulation; of 169 more pairs nearer than 0.1, all. `nsgs` has the same error after 100 sweeps on both to about a third, and `ppa-nsn`
-# takes the same number of iterations to about a fifth. From 0.2 on both differ by factors.
+# simulation; of 169 more pairs nearer than 0.1, all. `nsgs` has the same error after 100 sweeps
+# on both to about a third, and `ppa-nsn` takes the same number of iterations to about a fifth.
+# From 0.2 on both differ by factors.
 NEAR: Final = 0.1
 
 

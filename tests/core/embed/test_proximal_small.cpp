@@ -254,7 +254,8 @@ TEST(ProximalSmall, StartsFromAGuessAndHasItsOwnWordForBadData) {
     EXPECT_EQ(solve_serially<AsBlocks>(broken, r, u).ending, Ending::invalid);
     EXPECT_EQ(solve_serially<AsBodies>(broken, r, u).ending, Ending::invalid);
     EXPECT_EQ(solve_serially<AsFew>(broken, r, u).ending, Ending::invalid);
-    EXPECT_EQ(r, Vector::Zero(m));
+    EXPECT_TRUE(r.array().isNaN().all());
+    EXPECT_TRUE(u.array().isNaN().all());
   }
   for (Vector Planted<Law<3>>::* of : {&Planted<Law<3>>::q, &Planted<Law<3>>::guess}) {
     Planted<Law<3>> broken(5);

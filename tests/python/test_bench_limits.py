@@ -614,7 +614,7 @@ WITHOUT_GROUPS = (
     "works_in_a_child",
 )
 # what solvers have declared to take; of the others nothing is known
-DECLARED: dict[str, Any] = {"bad-flat": ((2,), ())}
+DECLARED: dict[str, Any] = {"bad-flat": {"": (2,), "rolling": (), "spin": ()}}
 # of programs: what a shell does with {output}
 PROGRAMS = {
     "true {input} {output}": "nothing",

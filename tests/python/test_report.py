@@ -471,8 +471,8 @@ def test_drawn_positions_of_assembled_families_are_those_of_their_equations(fami
     problem: Any = plan.scene.problem((plan.chosen or (0,))[0])
     network = network_of(problem)
     if problem.bodies is None:
-        # nothing is said of places, and nobody is told one
-        assert network.source == "graph"
+        # nothing is said of places: what is drawn is a graph, or follows from the levers in H
+        assert network.source != "file"
         assert "solids" not in view_of(problem)
         return
     assert network.source == "file"
@@ -487,9 +487,11 @@ def test_drawn_positions_of_assembled_families_are_those_of_their_equations(fami
     )
     H = problem.H.toarray()
     row = np.cumsum(problem.bodies.moves == 1) - 1
+    if problem.n == 3 * (row[-1] + 1):  # points have no moments
+        return
     compared = 0
     for contact, pair in enumerate(problem.contacts.body.tolist()):
-        columns = slice(3 * contact, 3 * contact + 3)
+        columns = slice(problem.spacedim * contact, problem.spacedim * contact + 3)
         for body in pair:
             if body < 0 or problem.bodies.moves[body] != 1:
                 continue

@@ -230,7 +230,7 @@ val read_siconos_text(const std::string& text, const std::string& kind) {
 
 val condense_problem(int address, const val& object) {
   return converted(address, object, []<class P>(const P& p) {
-    if constexpr (requires { condense(p); }) {
+    if constexpr (requires { p.H; }) {
       return condense(p);
     } else {
       throw Error(ErrorKind::unsuitable, "a " + std::string(P::kind) + " problem is condensed");

@@ -66,7 +66,7 @@ GROUPS = {
     "families-mixed": ("mixed",),
     "families-robots": ("robots",),
     "families-machines": ("machines",),
-    "families-quasistatic": ("quasistatic", "laws", "assembly", "flows"),
+    "families-quasistatic": ("quasistatic", "laws", "assembly", "flows", "spin"),
     "families-simulators": ("simulators",),
     "families-decks": ("decks",),
     "families-grains": ("granular", "rolling", "planar"),

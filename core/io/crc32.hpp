@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <type_traits>
 
@@ -24,7 +25,8 @@ std::uint32_t crc32_of(const Values& values, std::uint32_t before = 0) {
     return crc32({reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()}, before);
   } else {
     for (const Number& number : numbers) {
-      auto bytes = std::bit_cast<std::array<char, sizeof(Number)>>(number);
+      std::array<char, sizeof(Number)> bytes;
+      std::memcpy(bytes.data(), &number, sizeof(Number));
       std::reverse(bytes.begin(), bytes.end());
       before = crc32(bytes, before);
     }

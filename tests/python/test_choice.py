@@ -492,14 +492,14 @@ def test_versions_of_a_list_are_told_apart(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_published_states_have_guesses_without_the_steps_before(tmp_path: Path) -> None:
-    own = "rt444/KaplasTower"
+    own = "robots/Gripper"
     if published.root() is None:
         pytest.skip("the package of trajectories is not here")
     found = candidates.candidates_of(own, tmp_path, kept=3)
     assert found.states is not None
     first, middle, _ = found.numbers
     digests = {n: found.states.digest[found.states.index(n)] for n in (first, middle, middle + 1)}
-    chosen = [set_index.Choice("KaplasTower", {}, 0, n, n, text) for n, text in digests.items()]
+    chosen = [set_index.Choice("Gripper", {}, 0, n, n, text) for n, text in digests.items()]
     (path,) = select.publish({own: found}, chosen, "standard", "9", tmp_path)
     states = trajectory.read(path)
     # zero at the first contact, and the third one's step before is there
@@ -540,13 +540,15 @@ def test_sequences_change_and_are_apart(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_sequence_has_consecutive_states(tmp_path: Path) -> None:
-    own = "rt444/KaplasTower"
+    own = "rt444/Chain"
     if published.root() is None:
         pytest.skip("the package of trajectories is not here")
     numbers = sequences.window(own, 100)
     assert numbers is not None
-    assert (numbers[0], len(numbers)) == (50, 100)
+    assert (numbers[0], len(numbers)) == (707, 100)
     assert sequences.window("machines/Rover", 100) is None
+    # every third step, and of these what is hard
+    assert sequences.window("rt444/KaplasTower", 100) is None
     assert sequences.window("existence/Squeezed", 10) is None
     found = sequences.states_of(own, numbers, tmp_path)
     choices = sequences.choices_of(found)

@@ -45,7 +45,13 @@ def window(folder: str, steps: int) -> range | None:
     first = (len(there) - steps) // 2
     if first < 0 or there[first + steps - 1] - there[first] != steps - 1:
         return None
-    return range(int(there[first]), int(there[first]) + steps)
+    numbers = range(int(there[first]), int(there[first]) + steps)
+    if plan.trajectory is not None:  # which may have some of the steps
+        states = trajectory.read(plan.trajectory)
+        taken = [states.step[states.index(number)] for number in numbers]
+        if np.any(np.diff(taken) != 1):
+            return None
+    return numbers
 
 
 def choose(rows: Sequence[select.Row], rule: Rule) -> list[tuple[str, range]]:

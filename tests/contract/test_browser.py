@@ -62,7 +62,8 @@ def test_a_difference_is_seen() -> None:
 
 def test_solvers_and_options_are_those_of_python(browser: Module) -> None:
     def described(solver: Any) -> dict[str, Any]:
-        names = ("name", "family", "title", "citation", "dimensions", "rolling_dimensions")
+        names = ("name", "family", "title", "citation", "dimensions")
+        names += ("rolling_dimensions", "spin_dimensions")
         known = ("name", "type", "default", "unit", "doc", "choices", "lowest", "highest")
         return {name: getattr(solver, name) for name in names} | {
             "max_iterations": solver.max_iterations,
@@ -146,7 +147,10 @@ def test_condensed_problems_are_those_of_python(browser: Module) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kind": "round"}, "kind: is 'round', but must be one of: global, global_rolling, local"),
+        (
+            {"kind": "round"},
+            "kind: is 'round', but must be one of: global, global_rolling, global_spin, local",
+        ),
         ({"q": None}, "q: is missing"),
         ({"mu": np.array([0.5, -0.25])}, "/fclib_local/vectors/mu[1]: is -0.25, but must not be"),
         ({"spacedim": 3.5}, "spacedim: is not an integer"),

@@ -302,6 +302,7 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
         "decks",
         "rr9118",
         "fclib2024",
+        "spin",
         "quasistatic",
         "laws",
         "assembly",

@@ -411,7 +411,7 @@ enum fclib_status {
   FCLIB_DIVERGED,        /**< an iterate was not finite */
   FCLIB_INACCURATE,      /**< the solver said it was done, but MERIT_2 is above the tolerance */
   FCLIB_INTERRUPTED,
-  FCLIB_STALLED,   /**< the solver has nothing left to try; its best iterate is returned */
+  FCLIB_STALLED,    /**< the solver has nothing left to try; its best iterate is returned */
   FCLIB_INFEASIBLE, /**< there is no solution, and the solver has proven it */
   FCLIB_INVALID     /**< of a problem in a batch: its data are not valid */
 };
@@ -768,17 +768,17 @@ struct fclib_batch {
   double* error;             /**< (count) at least MERIT_2, and at most a thousandth of the
                                   tolerance above it */
   int* iterations;           /**< (count) */
-  /* W by blocks of spacedim x spacedim, each by rows, if starts is not NULL: row of blocks by row of
-     blocks. Contacts that no block connects are solved apart from each other. */
+  /* W by blocks of spacedim x spacedim, each by rows, if starts is not NULL: row of blocks by row
+     of blocks. Contacts that no block connects are solved apart from each other. */
   const int* starts;  /**< of each nc + 1: the first block of each contact, and their number */
   const int* columns; /**< of each block the other contact */
   int one_pattern;    /**< not 0: starts and columns are there once, for all problems */
   /* global problems, if M is not NULL: W and q are then NULL */
-  const int* n;    /**< degrees of freedom of each (count), or NULL: n_each */
-  int n_each;      /**< ... of every problem, if n is NULL */
-  const double* M; /**< of each n x n, symmetric */
-  const double* H; /**< of each n x m by columns, which is the Jacobian H^T by rows */
-  const double* f; /**< of each n */
+  const int* n;         /**< degrees of freedom of each (count), or NULL: n_each */
+  int n_each;           /**< ... of every problem, if n is NULL */
+  const double* M;      /**< of each n x n, symmetric */
+  const double* H;      /**< of each n x m by columns, which is the Jacobian H^T by rows */
+  const double* f;      /**< of each n */
   const double* w_free; /**< w, of each m, or NULL for zeros */
   double* v;            /**< result: of each n; may be NULL */
 };
@@ -820,8 +820,8 @@ struct fclib_derivatives {
 };
 
 /** New. Derivatives in adjoint mode, and in forward mode. One factorisation serves all sides of a
- *  problem. A problem with data that are not valid gets NaN, but zero weights or changes give zeros.
- *  Return 1, and 0 for sizes that make no sense. */
+ *  problem. A problem with data that are not valid gets NaN, but zero weights or changes give
+ * zeros. Return 1, and 0 for sizes that make no sense. */
 int fclib_batch_vjp(const struct fclib_derivatives* derivatives);
 int fclib_batch_jvp(const struct fclib_derivatives* derivatives);
 

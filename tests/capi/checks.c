@@ -457,9 +457,8 @@ static void solving(void) {
   CHECK(fclib_solver_name(0) && !fclib_solver_name(-1) && !fclib_solver_name(1000));
   CHECK(fclib_solve_local(&a, "nsgs", NULL, &s, &result));
   CHECK(result.status == FCLIB_CONVERGED && result.error <= 1e-8 && result.iterations > 0);
-  const char* names[] = {"converged",  "iteration_limit", "time_limit", "diverged",
-                         "inaccurate", "interrupted",     "stalled",    "infeasible",
-                         "invalid"};
+  const char* names[] = {"converged",   "iteration_limit", "time_limit", "diverged", "inaccurate",
+                         "interrupted", "stalled",         "infeasible", "invalid"};
   for (int k = 0; k <= FCLIB_INVALID; k++)
     CHECK(!strcmp(fclib_status_name((enum fclib_status)k), names[k]));
   CHECK(!strcmp(fclib_status_name((enum fclib_status)99), "unknown"));

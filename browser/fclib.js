@@ -226,8 +226,12 @@ export class Fclib {
 
   /** The solvers that take a problem. */
   solvers_for(problem) {
-    const dimensions = "mu_s" in problem ? "spin_dimensions"
-      : "mu_r" in problem ? "rolling_dimensions" : "dimensions";
+    const dimensions =
+      "mu_s" in problem
+        ? "spin_dimensions"
+        : "mu_r" in problem
+          ? "rolling_dimensions"
+          : "dimensions";
     return this.solvers().filter((solver) => solver[dimensions].includes(problem.spacedim));
   }
 

@@ -371,7 +371,7 @@ def planted_spin(
     `ratio`; `edges` puts contacts on the borders between their states.
     """
     rng = np.random.default_rng(seed)
-    bounds = {"mu": rng.uniform(0.2, 0.8, nc), "mu_s": rng.uniform(0.05, 0.3, nc)}
+    bounds: dict[str, Any] = {"mu": rng.uniform(0.2, 0.8, nc), "mu_s": rng.uniform(0.05, 0.3, nc)}
     if d == 6:
         bounds["mu_r"] = rng.uniform(0.05, 0.3, nc)
     if without:

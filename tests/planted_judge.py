@@ -276,7 +276,7 @@ def spinning(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     name, d = SPIN_LAWS[number % len(SPIN_LAWS)]
     nc = int(rng.integers(1, 8))
     spread = rng.choice([0.0, 1.0, 6.0])
-    law = {
+    law: dict[str, Any] = {
         key: size * 10.0 ** rng.uniform(-spread, spread / 6, nc) * (rng.uniform(size=nc) > 0.15)
         for key, size in (("mu", 0.5), ("mu_s", 0.02), ("mu_r", 0.01))[: d // 2]
     }

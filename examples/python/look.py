@@ -30,10 +30,8 @@ def main(path: str) -> None:
     print(f"{problem.nc} contacts, friction {problem.mu.min():g} to {problem.mu.max():g}")
 
     # the local form has all that the contacts see
-    if isinstance(problem, fclib.GlobalProblem | fclib.GlobalRollingProblem):
-        local = problem.condense()
-    else:
-        local = problem
+    globally = fclib.GlobalProblem | fclib.GlobalRollingProblem | fclib.GlobalSpinProblem
+    local = problem.condense() if isinstance(problem, globally) else problem
     W, d = sp.csr_array(local.W), local.spacedim
     print(f"W: {W.shape[0]} x {W.shape[1]}, {W.nnz} entries")
     print(f"   max |W - W^T| / max |W| = {abs(W - W.T).max() / abs(W).max():.0e}")

@@ -7,6 +7,7 @@ of the loss. There is no loop over worlds.
 """
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ per_kg = np.r_[np.ones(3), np.full(3, 1.5 / HALF**2)]
 W_per_kg = (H.T * per_kg) @ H
 
 
-def data(log_mass, velocity, push):
+def data(log_mass: Any, velocity: Any, push: Any) -> tuple[Any, Any]:
     """W and q of many steps of a cube with this mass, from velocities before them."""
     mass = np.exp(log_mass)
     fall = velocity - STEP * GRAVITY * np.eye(6)[2]
@@ -35,7 +36,7 @@ def data(log_mass, velocity, push):
     return W, (fall + push * per_kg / mass) @ H
 
 
-def loss_and_slope(guess, velocity, push, seen):
+def loss_and_slope(guess: Any, velocity: Any, push: Any, seen: Any) -> tuple[float, Any]:
     """The mean square of what is wrong with the corners' velocities, and its gradient."""
     W, q = data(guess[0], velocity, push)
     mu = np.full((len(q), 4), np.exp(guess[1]))

@@ -62,8 +62,8 @@ def test_a_difference_is_seen() -> None:
 
 def test_solvers_and_options_are_those_of_python(browser: Module) -> None:
     def described(solver: Any) -> dict[str, Any]:
-        names = ("name", "family", "title", "citation", "dimensions")
-        names += ("rolling_dimensions", "spin_dimensions")
+        dimensions = ("dimensions", "rolling_dimensions", "spin_dimensions")
+        names = ("name", "family", "title", "citation", *dimensions)
         known = ("name", "type", "default", "unit", "doc", "choices", "lowest", "highest")
         return {name: getattr(solver, name) for name in names} | {
             "max_iterations": solver.max_iterations,

@@ -186,13 +186,14 @@ def test_islands_do_not_disturb_each_other() -> None:
 def test_wrong_patterns_are_refused_by_their_name() -> None:
     W, q, mu, (starts, columns) = islands(2)
     blocks = np.zeros((2, 12, 3, 3))
-    for arguments, words in [
+    cases: list[tuple[dict[str, Any], str]] = [
         ({"pattern": (starts,)}, r"pattern: is not \(starts, columns\)"),
         ({"pattern": (starts, columns[1:])}, "pattern: the last of starts"),
         ({"pattern": (starts * 1.0, columns)}, "pattern: starts is not a list of whole numbers"),
         ({"pattern": (starts, columns), "contacts": [6, 6]}, "pattern: is for problems with"),
         ({"pattern": (starts[[0, 2, 1, 3, 4, 5, 6]], columns)}, "starts: problem 0"),
-    ]:
+    ]
+    for arguments, words in cases:
         with pytest.raises(fclib.ProblemError, match=words):
             fclib.solve_batch(blocks, q, mu, **arguments)
     with pytest.raises(

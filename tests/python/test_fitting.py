@@ -101,6 +101,7 @@ def test_free_connector_slides_in_and_friction_slows_it() -> None:
     assert result.converged
     r = np.reshape(result.solution.r, (-1, 3))
     lifted = problem.H[2] @ result.solution.r
+    assert result.solution.v is not None
     assert result.solution.v[2] == pytest.approx(
         (lifted - own.force * assembly.STEP) / own.mass, rel=1e-6
     )
@@ -168,6 +169,7 @@ def test_cable_stops_below_the_limit_and_slides_beyond(number: int) -> None:
     result = fclib.solve(problem, tol=1e-9)
     assert result.converged
     known = facts(problem)
+    assert result.solution.v is not None
     speed = np.abs(result.solution.v).max()
     if known["pull"] < known["limit"]:
         assert speed < 1e-3 * own.vibration
@@ -186,6 +188,7 @@ def test_lambda_is_the_tension() -> None:
     start = own.vibration * np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, (13, 3))
     result = fclib.solve(own.wound(0.5, 24, 1.0, start), tol=1e-10)
     assert result.converged
+    assert result.solution.l is not None
     np.testing.assert_allclose(result.solution.l, -own.held * assembly.STEP, rtol=0.02)
 
 

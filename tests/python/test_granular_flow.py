@@ -104,6 +104,7 @@ def test_momentum_comes_from_gravity_and_from_the_walls() -> None:
 
     result = fclib.solve(problem, "nsgs", tol=2e-3)
     assert result.error <= 2e-3
+    assert result.solution.v is not None
     v = np.reshape(result.solution.v, (-1, 6))
     gained = (mass * (v - v0))[:, :3].sum(axis=0)
     # contacts of grains cancel: only those with walls act on the whole

@@ -67,7 +67,7 @@ def test_shifted_problem_is_the_law_with_cohesion(kind: str) -> None:
     problem = own.of_kind(kind, 100, 0.05 if kind == "pushed" else 0.9)
     glue = facts(problem)["cohesion_impulse"]
     bodies = assembly.running_bond(100, 0, push=own.push if kind == "pushed" else 0.0)
-    plain = bodies.problem(own.mu, "")
+    plain: Any = bodies.problem(own.mu, "")
     solution = solved(problem, 1e-11)
     # a curtain is the wall upside down, with the same masses and gravity
     np.testing.assert_allclose(problem.M.toarray(), plain.M.toarray())

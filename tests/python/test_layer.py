@@ -88,9 +88,14 @@ def test_a_bad_world_has_its_status_and_hurts_no_other() -> None:
 
 def test_a_whole_batch_has_no_loop_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """A call of the core for all of them, whatever their number."""
-    calls = []
+    calls: list[int] = []
     own = fclib._core.vjp_batch
-    monkeypatch.setattr(fclib._core, "vjp_batch", lambda *a, **k: (calls.append(1), own(*a, **k)))
+
+    def counted(*arguments: Any, **named: Any) -> Any:
+        calls.append(1)
+        return own(*arguments, **named)
+
+    monkeypatch.setattr(fclib._core, "vjp_batch", counted)
     W, q, mu = (np.concatenate([one] * 40) for one in batch(count=3, nc=2))
     r, _, _ = _layer.forward(W, q, mu, 3, 1e-12, 2)
     _layer.backward(W, q, mu, r, 3, *weights(q.shape), 2)

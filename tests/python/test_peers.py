@@ -361,7 +361,8 @@ def test_we_read_what_libfclib_writes(
     assert problem.info.title == "a title"
     assert problem.info.description == "made by 3.1"
     np.testing.assert_array_equal(problem.mu, ramp(nc, 0.25))
-    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
+    local = (fclib.LocalProblem, fclib.LocalRollingProblem, fclib.LocalSpinProblem)
+    if isinstance(problem, local):
         np.testing.assert_array_equal(dense(problem.W), known(m, m))
         np.testing.assert_array_equal(problem.q, ramp(m, -1))
         if p:

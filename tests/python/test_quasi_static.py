@@ -229,13 +229,13 @@ def test_stress_is_on_the_yield_surface_and_its_tangent_keeps_it_there() -> None
 
     def F(sigma: Any) -> float:
         s = sigma - np.trace(sigma) / 3 * np.eye(3)
-        return math.sqrt(0.5 * (s * s).sum()) + own.internal * np.trace(sigma) / 3
+        return float(math.sqrt(0.5 * (s * s).sum()) + own.internal * np.trace(sigma) / 3)
 
     assert F(stress) == pytest.approx(0, abs=1e-9 * own.pressure)
     # beta < alpha: the bound is above 0, and so small a share of it is nothing beside G / 20
     C = own.tangent(0.0)
     strain = 1e-9 * strains()[2].reshape(3, 3)
-    elastic = assemblies()["PlasticTangent"](hardening=1e9).tangent(0.0)
+    elastic = family("PlasticTangent", hardening=1e9).tangent(0.0)
     slack = F(stress + np.einsum("ikjl,jl->ik", C, strain))
     free = F(stress + np.einsum("ikjl,jl->ik", elastic, strain))
     assert abs(slack) < 0.1 * abs(free)
@@ -306,4 +306,5 @@ def test_holder_that_stays_leaves_the_stress_as_it_is() -> None:
         np.testing.assert_allclose(
             r[:, component], -share.ravel() * stress[row, 2], atol=1e-6 * own.pressure * 1e-3
         )
+    assert result.solution.v is not None
     np.testing.assert_allclose(result.solution.v, 0, atol=1e-6 * own.move)

@@ -1077,7 +1077,8 @@ def test_a_step_that_cannot_be_recorded_is_left_out(
     assert len(fclib.Sequence(path)) == int(left[1]) > 5
     if count:
         assert int(left[2]) - int(left[1]) == count
-    assert all(np.isfinite(problem.f).all() for problem in fclib.Sequence(path))
+    problems: Any = fclib.Sequence(path)
+    assert all(np.isfinite(problem.f).all() for problem in problems)
 
 
 def test_what_is_not_recorded_of_mujoco_is_named() -> None:

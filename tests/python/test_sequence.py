@@ -567,7 +567,7 @@ def test_a_flipped_byte_is_told(tmp_path: Path, compression: int) -> None:
     whole: list[Read] = []
     with SequenceWriter(path, compression=compression) as writer:
         for seed in range(6):
-            made = planted_global(seed, nc=17)
+            made: Any = planted_global(seed, nc=17)
             q = made.problem.replace(f=rng.standard_normal(made.problem.n))
             whole.append((q, made.solution))
             writer.append(q, made.solution, world=seed % 2)

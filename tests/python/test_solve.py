@@ -71,7 +71,8 @@ def test_bilateral_constraints_hold(d: int, kind: str) -> None:
     solution = fclib.solve(problem, tol=1e-10).solution
     r, lam = solution.r, solution.l
     assert lam is not None
-    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
+    local = (fclib.LocalProblem, fclib.LocalRollingProblem, fclib.LocalSpinProblem)
+    if isinstance(problem, local):
         assert problem.s is not None
         residual = dense(problem.V).T @ r + dense(problem.R) @ lam + problem.s
     else:

@@ -169,7 +169,9 @@ def test_there_is_no_planar_spin_and_no_text_of_siconos(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("law", "d"), SPIN_LAWS)
 def test_a_proof_that_there_is_no_solution_holds(law: str, d: int) -> None:
     # two contacts that press a body that cannot yield
-    bounds = {"mu": [0.5, 0.5], "mu_s": [0.1, 0.1]} | ({"mu_r": [0.1, 0.1]} if d == 6 else {})
+    bounds: dict[str, Any] = {"mu": [0.5, 0.5], "mu_s": [0.1, 0.1]} | (
+        {"mu_r": [0.1, 0.1]} if d == 6 else {}
+    )
     H = np.zeros((d, 2 * d))
     H[:, :d], H[:, d:] = np.eye(d), -np.eye(d)
     w = np.zeros(2 * d)

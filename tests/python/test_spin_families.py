@@ -140,6 +140,7 @@ def test_simulate_takes_condim_6_with_a_limit_for_each(tmp_path: Path) -> None:
     steps = run(tmp_path, 6, 5)
     problem = steps[1].problem
     assert isinstance(problem, fclib.GlobalSpinProblem)
+    assert problem.mu_r is not None
     assert (problem.spacedim, problem.coupled, problem.formulation) == (6, 0, "GSR3DFC")
     assert (problem.mu_s[0], problem.mu_r[0]) == (0.006, 0.0002)
     for k, step in enumerate(steps):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +26,14 @@ def path_of(kind: str, bricks: int) -> list[np.ndarray]:
     slipped = np.zeros(((bricks + 1) ** 2, 2))
     found = []
     for step in range(STEPS):
-        problem = family.of_step(kind, bricks, step, slipped)
+        problem: Any = family.of_step(kind, bricks, step, slipped)
         result = fclib.solve(problem, tol=TOLERANCE)
         if not result.converged:
             raise SystemExit(f"{kind}, {bricks} bricks, step {step}: {result.message}")
         ends = np.reshape(problem.H.T @ result.solution.v, (-1, 3))[:, 1:]
         quanta = np.rint(ends / QUANTUM).astype(np.int64)
         found.append(quanta)
-        slipped = QUANTUM * quanta
+        slipped = np.asarray(QUANTUM * quanta)
         print(kind, bricks, step, result.iterations, f"{result.error:.1e}", flush=True)
     return found
 
@@ -42,7 +43,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("out", type=Path)
     out = parser.parse_args().out
-    arrays = {f"slipped{face}": np.stack(path_of(*kind)) for face, kind in enumerate(KINDS_OF_FACE)}
+    arrays: dict[str, Any] = {
+        f"slipped{face}": np.stack(path_of(*kind)) for face, kind in enumerate(KINDS_OF_FACE)
+    }
     np.savez_compressed(out, **arrays)
 
 

@@ -107,7 +107,7 @@ def problems(
     rng = np.random.default_rng(seed)
     worlds, W, q = [], [], []
     for _ in range(count):
-        world = SCENES[name](rng)
+        world: World = SCENES[name](rng)  # type: ignore[no-untyped-call]
         scaled = world.inverse_mass[:, None] * world.H
         product = world.H.T @ scaled
         W.append((product + product.T) / 2)

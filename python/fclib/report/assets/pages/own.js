@@ -3,8 +3,15 @@
 (() => {
   const { h, number, facts } = Fclib;
 
-  const KINDS = ["", "global", "local", "global_rolling", "local_rolling", "global_spin",
-    "local_spin"];
+  const KINDS = [
+    "",
+    "global",
+    "local",
+    "global_rolling",
+    "local_rolling",
+    "global_spin",
+    "local_spin",
+  ];
   Fclib.pages.own = async (page) => {
     page.append(
       h("h1", {}, "Your own file"),

@@ -33,7 +33,7 @@ class BodyForm {
   [[nodiscard]] BlockView W() const { return {starts_.data(), columns_.data(), values_.data()}; }
   [[nodiscard]] const double* q() const { return q_.data(); }
 
-  /// An error of r that is at least the merit's, with u (m) and v (n) where they are not null.
+  /// An error of r that is at least the merit's, with u (m) and v (n) if they are not null.
   double judge(const double* mu, const double* r, double* u, double* v);
 
  private:

@@ -10,7 +10,7 @@
 namespace fclib {
 
 /// `size(a)` is the mean |W_kk| of contact a, `velocity(a)` its W r + q and `free(a)` its q. Where
-/// q is given, this is Merit::error; where it is condensed, its rounding counts as an error, so
+/// q is given, this is Merit::error; if it is condensed, its rounding counts as an error, so
 /// that this is no less.
 template <int D, class Size, class Velocity, class Free>
 double contact_error(std::int64_t nc, const double* mu, const double* r, const Size& size,

@@ -26,7 +26,7 @@ gauss-seidel                    : gauss_seidel                                  
 # large and dense, to a loose tolerance: a factorisation costs as much as hundreds of products with W
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
-# from near what the sweeps have; where it slows down, the proximal point is near enough
+# from near what the sweeps have; if it slows down, the proximal point is near enough
 interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60 polish=1e-4
 # dense heaps on which its path ends, or no memory for factors (ChainMail/0599 to 1e-4)
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
@@ -34,7 +34,7 @@ gauss-seidel                    : sweep_on            law=coulomb
 # near a solution, once gradients or sweeps have smoothed what the interior point has left (large heaps:
 # docs/results/auto-near-heaps.csv)
 proximal point, near            : proximal_point      from=best below=1e-4             limit=200
-# where the path of the first one folds: from far away
+# if the path of the first one folds: from far away
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
 # a tight tolerance, where interior points end at rounding (PeriodicBox/0995 to 1e-12)
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
@@ -47,7 +47,7 @@ interior point, smoothed        : interior_point      law=coulomb from=swept    
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 # (Chute4000/0074; Chute1000/0116 to 1e-4)
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
-# where most bodies rest: reactions that hold them are found by convex problems, with all that creep
+# if most bodies rest: reactions that hold them are found by convex problems, with all that creep
 held bodies                     : held_bodies         at_least=100                     creep=0
 # 100786, 101711
 proximal point                  : proximal_point      from=best                        limit=200

@@ -13,6 +13,7 @@ import pytest
 import scipy.sparse as sp
 
 import fclib
+from fclib.external import siconos
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -27,6 +28,15 @@ def case(name: str) -> Path:
     if not path.is_file():
         pytest.skip(f"{path} is not there")
     return path
+
+
+def needs_siconos_mechanics() -> None:
+    """Skips the test if Siconos is not there, or cannot simulate: its own package lacks SciPy."""
+    if siconos.missing():
+        pytest.skip("Siconos is not installed")
+    code = "import siconos.io.mechanics_run, siconos.mechanics.collision.bullet"
+    if subprocess.run([siconos.python(), "-c", code], capture_output=True, check=False).returncode:
+        pytest.skip("Siconos has no mechanics with Bullet, or its Python has no SciPy")
 
 
 # ---- the law, in NumPy

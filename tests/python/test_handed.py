@@ -25,7 +25,7 @@ from fclib.collections.verify import verify
 from fclib.external import siconos
 from fclib.recorders import _siconos
 from fclib.scenes import Scene
-from helpers import dense
+from helpers import dense, needs_siconos_mechanics
 from workshop.sets import _rt444_scenes, rt444_states
 
 H, THETA, GRAVITY, MU = 1e-3, 0.6, 9.81, 0.4
@@ -250,16 +250,13 @@ with mechanics_run.MechanicsHdf5Runner(mode="r+", io_filename=file) as io:
 
 def test_problems_of_what_siconos_tells_are_its_own(tmp_path: Path) -> None:
     """W from poses, velocities and contacts is Siconos' W; its normal components to rounding."""
-    if siconos.missing():
-        pytest.skip("Siconos is not installed")
+    needs_siconos_mechanics()
     script = tmp_path / "planks.py"
     script.write_text(PLANKS, encoding="utf-8")
     command = [siconos.python(), str(_siconos.STEPS), str(tmp_path), "3", str(script)]
     done = subprocess.run(
         [*command, str(tmp_path / "scene.hdf5")], capture_output=True, text=True, check=False
     )
-    if "mechanics" in done.stderr and done.returncode:
-        pytest.skip("Siconos has no mechanics with Bullet")
     assert done.returncode == 0, done.stderr
     two = spinning = 0
     equal = []
@@ -595,8 +592,7 @@ def test_siconos_goes_on_from_a_step_with_these_reactions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The lowest box rests; its reactions in Siconos' steps are solutions to the tolerance."""
-    if siconos.missing():
-        pytest.skip("needs Siconos")
+    needs_siconos_mechanics()
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     folder = tmp_path / "BoxesStack"
     written(folder / "run-0", 100, 0.0, first=100)

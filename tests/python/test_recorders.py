@@ -6,7 +6,6 @@ import dataclasses
 import json
 import math
 import re
-import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -20,9 +19,8 @@ from typer.testing import CliRunner
 import fclib
 from fclib import recorders
 from fclib.cli import app
-from fclib.external import siconos
 from fclib.recorders import _newton
-from helpers import dense
+from helpers import dense, needs_siconos_mechanics
 
 H = 1e-3
 DOWN = -9.81 * H
@@ -779,16 +777,8 @@ GLOBAL = ("MoreauJeanGOSI", "SICONOS_GLOBAL_FRICTION_3D_NSGS_WR")
 LOCAL = ("MoreauJeanOSI", "SICONOS_FRICTION_3D_NSGS")
 
 
-def needs_siconos() -> None:
-    if siconos.missing():
-        pytest.skip("Siconos is not installed")
-    code = "import siconos.io.mechanics_run, siconos.mechanics.collision.bullet"
-    if subprocess.run([siconos.python(), "-c", code], capture_output=True, check=False).returncode:
-        pytest.skip("Siconos has no mechanics with Bullet")
-
-
 def test_siconos_own_problem_is_recorded(tmp_path: Path) -> None:
-    needs_siconos()
+    needs_siconos_mechanics()
     script = tmp_path / "balls.py"
     script.write_text(SICONOS, encoding="utf-8")
     before: Any = None
@@ -819,7 +809,7 @@ def test_siconos_own_problem_is_recorded(tmp_path: Path) -> None:
 
 
 def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
-    needs_siconos()
+    needs_siconos_mechanics()
     script = tmp_path / "balls.py"
     script.write_text(SICONOS, encoding="utf-8")
     out = tmp_path / "out"
@@ -840,7 +830,7 @@ def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scheme", [GLOBAL, LOCAL])
 def test_siconos_bodies_that_touch_nothing_fall(scheme: tuple[str, str], tmp_path: Path) -> None:
     """Balls above the ground: they fall while it is recorded, as they do while it is not."""
-    needs_siconos()
+    needs_siconos_mechanics()
     script = tmp_path / "falling.py"
     script.write_text(SICONOS.replace("[1.01 * i, 0, 0.5]", "[2 * i, 0, 0.52]"), encoding="utf-8")
     recording = recorders.Recording(tmp_path / "out")
@@ -856,7 +846,7 @@ def test_siconos_bodies_that_touch_nothing_fall(scheme: tuple[str, str], tmp_pat
 
 
 def test_a_script_of_siconos_that_fails_keeps_its_steps(tmp_path: Path) -> None:
-    needs_siconos()
+    needs_siconos_mechanics()
     script = tmp_path / "balls.py"
     script.write_text(SICONOS, encoding="utf-8")
     out = tmp_path / "out"

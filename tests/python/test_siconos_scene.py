@@ -15,6 +15,7 @@ from fclib.cli import app
 from fclib.external import siconos
 from fclib.scenes import Scene
 from fclib.scenes.shared import siconos_input
+from helpers import needs_siconos_mechanics
 
 pytest.importorskip("mujoco")
 pytest.importorskip("h5py")
@@ -257,8 +258,8 @@ with runner.MechanicsHdf5Runner(mode="w", io_filename=sys.argv[1]) as io:
 """
 
 
-@pytest.mark.skipif(siconos.missing() != "", reason="needs Siconos")
 def test_what_siconos_itself_writes_is_read(tmp_path: Path) -> None:
+    needs_siconos_mechanics()
     path = tmp_path / "own.hdf5"
     done = subprocess.run([siconos.python(), "-c", WRITES, path], capture_output=True, text=True)
     assert path.is_file(), done.stderr

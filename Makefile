@@ -23,13 +23,14 @@ ESLINT = $(JS)/node_modules/.bin/eslint --config $(JS)/eslint.config.mjs
 HAS_NPM := $(shell command -v npm)
 NO_NPM := @echo "== there is no npm: JavaScript is not checked (apt-get install npm)"
 
-.PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
+.PHONY: setup demo test test-long wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
         collection-wheel results-wheel campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
+	@echo "make test-long  the tests of a minute or more, which make test leaves out"
 	@echo "make wasm    the core as a module for browsers, into $(BUILD)/wasm/fclib (needs Emscripten)"
 	@echo "make docs    set up, then build the documentation into $(BUILD)/site (REPORT=ADDRESS: links to a report)"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
@@ -67,7 +68,10 @@ test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	  else echo "== there is no Emscripten: the tests of the module for browsers are skipped"; fi
 	@# compiled tests are kept, where the environment forbids it too: each process would make them anew
 	PYTHONDONTWRITEBYTECODE= FCLIB_BUILD=$(CURDIR)/$(BUILD) \
-	  $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+	  $(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not long"
+
+test-long: setup $(VENV)/.test-tools $(VENV)/.test-system
+	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest -n $(JOBS) -m long
 
 wasm:
 	@command -v emcmake >/dev/null && command -v node >/dev/null || { echo "make wasm needs Emscripten \
@@ -180,7 +184,7 @@ deb:
 release: $(VENV)/.package-tools
 	$(BIN)/python scripts/release.py check
 	rm -rf dist
-	$(MAKE) lint test docs
+	$(MAKE) lint test test-long docs
 	$(MAKE) wheels collection-wheel results-wheel deb
 	$(BIN)/python scripts/release.py finish dist
 

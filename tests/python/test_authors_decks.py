@@ -14,7 +14,13 @@ from fclib.collections import published, trajectory
 from fclib.scenes.shared import recorded
 from helpers import dense
 
-SIMULATED = ("ElasticCubes", "ElasticCubesx2", "ElasticCubesx20", "ShakenCell", "SpheresInPlates")
+SIMULATED = (
+    "ElasticCubes",
+    "ElasticCubesx2",
+    pytest.param("ElasticCubesx20", marks=pytest.mark.long),
+    "ShakenCell",
+    pytest.param("SpheresInPlates", marks=pytest.mark.long),
+)
 
 
 def matrix(turn: Any) -> Any:

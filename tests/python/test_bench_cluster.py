@@ -332,8 +332,7 @@ def preempted() -> None:
 
 @jobqueue
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [cancelled, preempted])
-@pytest.mark.parametrize("processes", ["1", "2"])
+@pytest.mark.parametrize(("processes", "way"), [("1", cancelled), ("2", preempted)])
 def test_jobs_of_slurm_that_end_are_replaced(
     processes: str, way: Any, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -361,7 +360,7 @@ def test_jobs_of_slurm_that_end_are_replaced(
 
 
 @jobqueue
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_walltime_shorter_than_the_campaign(
     slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

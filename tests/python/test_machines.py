@@ -190,6 +190,7 @@ def macroscopic_friction(load: float, mu: float) -> float:
     return float(drive / press)
 
 
+@pytest.mark.long
 def test_shear_strength_does_not_depend_on_the_load_and_does_on_friction() -> None:
     """Rigid grains have no scale of stress: the force grows as the load does (Coulomb 1776)."""
     light, heavy = macroscopic_friction(50, 0.5), macroscopic_friction(200, 0.5)

@@ -642,7 +642,7 @@ def test_the_c_library_refuses_the_same_files(refuse: Path, copied: Path) -> Non
     assert refusals(refuse, good) == [("accepted", "")]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_c_library_is_clean_on_the_same_files(refuse: Path, copied: Path) -> None:
     tool = shutil.which("valgrind")
     if tool is None:

@@ -385,7 +385,11 @@ def test_contacts_across_a_periodic_boundary_are_near_both_bodies() -> None:
     assert network_of(silent).shifts is None
 
 
-def families(assembled: bool) -> list[str]:
+# 100,000 contacts
+LONG = {"flows/GranularFlow": pytest.mark.long}
+
+
+def families(assembled: bool) -> list[Any]:
     """SET/FAMILY of all families, each once: of `standard`, and of `extended` what that has not.
 
     Chute1000 stands for Chute4000, which has four times as many grains. What other engines
@@ -399,7 +403,8 @@ def families(assembled: bool) -> list[str]:
     from fclib import scenes
 
     simulated = scenes.families()
-    return [own for name, own in found.items() if (name not in simulated) == assembled]
+    chosen = [own for name, own in found.items() if (name not in simulated) == assembled]
+    return [pytest.param(k, marks=LONG.get(k, ())) for k in chosen]
 
 
 def a_problem(own: str) -> tuple[Any, Any, Any]:

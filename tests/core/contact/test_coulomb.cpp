@@ -108,7 +108,7 @@ TEST(CoulombCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
 }
 
 TEST(CoulombCone, the_coefficient_is_that_of_the_contact) {
-  const Friction friction{Eigen::Vector3d(0.2, 0.7, 1e7), {}};
+  const Friction friction{Eigen::Vector3d(0.2, 0.7, 1e7), {}, {}};
   for (Eigen::Index contact = 0; contact < 3; ++contact) {
     const Coulomb<3> cone(friction, contact);
     EXPECT_EQ(cone.mu(), friction.mu[contact]);

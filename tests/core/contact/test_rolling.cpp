@@ -141,7 +141,7 @@ TEST(RollingCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
 }
 
 TEST(RollingCone, the_coefficients_are_those_of_the_contact) {
-  const Friction friction{Eigen::Vector2d(0.2, 0.7), Eigen::Vector2d(0.01, 0.02)};
+  const Friction friction{Eigen::Vector2d(0.2, 0.7), Eigen::Vector2d(0.01, 0.02), {}};
   const Rolling<5> cone(friction, 1);
   EXPECT_EQ(cone.coefficient(0), 0.7);
   EXPECT_EQ(cone.coefficient(1), 0.02);

@@ -106,11 +106,13 @@ RealVector contact_norms(const RealVector& x, Index d) {
   return result;
 }
 
-/// Impulses that stop these velocities of the contacts, each alone.
-RealVector stopping(const RealVector& velocity, const RealVector& scale, Index d) {
+/// Impulses that stop these velocities of the contacts, each alone; none is slower than `least`.
+RealVector stopping(const RealVector& velocity, const RealVector& scale, Index d,
+                    const Real& least = 0) {
   RealVector result = contact_norms(velocity, d);
   for (Eigen::Index k = 0; k < result.size(); ++k) {
     const Real w = scale[k / d];
+    if (result[k] < least) result[k] = least;
     result[k] = w > 0 ? result[k] / w : Real(0);
   }
   return result;
@@ -299,7 +301,11 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
   if (is_mixed(problem)) {
     const RealVector velocity =
         sizes_transposed(problem.G, free) + problem.b.cast<Real>().cwiseAbs();
-    result.l = quotient(velocity, gram(problem.G, condensed != nullptr ? condensed->R : none));
+    const RealVector of_R = gram(problem.G, condensed != nullptr ? condensed->R : none);
+    result.l = quotient(velocity, of_R);
+    const RealVector s = product_transposed(problem.G, free) + problem.b.cast<Real>();
+    result.least_joint = root_mean_square(s);
+    result.least_l = quotient(RealVector::Constant(s.size(), result.least_joint), of_R);
     impulse += sizes(problem.G, result.l);
   }
   result.free_u = product_transposed(problem.H, free);
@@ -397,8 +403,10 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
       const RealVector left = beyond(residual, rounding_unit * terms);
       Mismatch mismatch{.part = "v", .stored = v.size() > 0 ? solution.v[0] : 0};
       if (!left.isZero(0)) {
-        RealVector impulse = sizes(problem.H, stop);
-        if (mixed) impulse += sizes(problem.G, own.l);
+        // the velocity that a reaction gives a body next to nothing that moves is not 0
+        const Real slowest = root_mean_square(own.free_u);
+        RealVector impulse = sizes(problem.H, stopping(own.q, own.scale, d, slowest));
+        if (mixed) impulse += sizes(problem.G, largest(own.l, own.least_l));
         const RealVector velocity = largest(fastest, solved(mass, impulse));
         const RealVector least = RealVector::Constant(
             v.size(), velocity.maxCoeff() * std::numeric_limits<double>::epsilon());
@@ -426,8 +434,9 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
       if (!beyond(residual, rounding_unit * parts).isZero(0)) {
         rounding += Spread(mass, terms).along(problem.G);  // the impulses are rounded too
       }
-      found.push_back(
-          worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding), parts));
+      const RealVector least = RealVector::Constant(residual.size(), own.least_joint);
+      found.push_back(worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding),
+                            largest(parts, least)));
     }
     return found;
   };

@@ -5,7 +5,9 @@
 // The terms are as large as the data explain, so that a solution cannot hide an error behind large
 // reactions of its own. What is left is then relative to a velocity: that of the body, the contact
 // or the joint, with the velocities that reactions of the problem's own size give it. Neither the
-// size of a neighbour nor a self-stress, which moves nothing, enters that velocity.
+// size of a neighbour nor a self-stress, which moves nothing, enters that velocity. No contact and
+// no joint counts as slower than the root mean square of all: at a body that rests because its
+// neighbours hold it, rounding is no mistake.
 #pragma once
 
 #include <string_view>
@@ -38,6 +40,8 @@ struct OwnSizes {
   RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
   RealVector free_u;    ///< q, condensed (m) [m/s]
   RealVector l;         ///< reactions that stop the joints, each joint alone (p)
+  RealVector least_l;   ///< the same, for the velocity least_joint at each; of a global problem (p)
+  Real least_joint = 0;  ///< root mean square of s, condensed, of a global problem [m/s]
   RealVector q;         ///< of the terms of u without reactions (m) [m/s]
   RealVector rounding;  ///< what double precision leaves of the terms that q is made of (m)
                         ///< [m/s]; empty if q is given

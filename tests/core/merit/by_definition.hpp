@@ -64,7 +64,7 @@ Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
   reduced.scale.resize(problem.mu.size());
   // impulses that stop velocities of the contacts, each alone
   const auto stopping = [&](const Vector& velocity) {
-    Vector impulse = by_contact(velocity, d);
+    Vector impulse = velocity;
     for (Eigen::Index k = 0; k < impulse.size(); ++k) impulse[k] /= reduced.scale[k / d];
     return impulse;
   };
@@ -83,7 +83,7 @@ Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
     reduced.u = w * given.r + v * l + problem.q;
     const Vector held = s.cwiseQuotient(r.diagonal()).cwiseAbs();
     const Vector own = problem.q.cwiseAbs() + sizes(v, held);
-    const Vector stop = stopping(own);
+    const Vector stop = stopping(by_contact(own, d));
     if (mixed) {
       result.bilateral =
           worst(v.transpose() * given.r + r * l + s,
@@ -108,16 +108,21 @@ Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
     const Vector fastest = v.cwiseAbs().cwiseMax(free.cwiseAbs());
     reduced.q = h.transpose() * free + problem.w;
     reduced.u = h.transpose() * v + problem.w;
+    const Vector s = g.transpose() * free + b;
     if (given.v.size() > 0) {
-      Vector stop = sizes(h, stopping(sizes(h.transpose(), free) + problem.w.cwiseAbs()));
+      const Vector contacts =
+          by_contact(sizes(h.transpose(), free) + problem.w.cwiseAbs(), d);
+      Vector stop = sizes(h, stopping(at_least(contacts, reduced.q)));
       if (mixed) {
         const Vector inertia = (g.transpose() * inverse * g).diagonal();
-        stop += sizes(g, (sizes(g.transpose(), free) + b.cwiseAbs()).cwiseQuotient(inertia));
+        const Vector joints = at_least(sizes(g.transpose(), free) + b.cwiseAbs(), s);
+        stop += sizes(g, joints.cwiseQuotient(inertia));
       }
       result.dynamics = worst(v - follows, fastest.cwiseMax((inverse * stop).cwiseAbs()));
     }
     if (mixed) {
-      result.bilateral = worst(g.transpose() * v + b, sizes(g.transpose(), fastest) + b.cwiseAbs());
+      result.bilateral = worst(g.transpose() * v + b,
+                               at_least(sizes(g.transpose(), fastest) + b.cwiseAbs(), s));
     }
     if (given.u.size() > 0) {
       const Vector velocity = by_contact(sizes(h.transpose(), fastest) + problem.w.cwiseAbs(), d);

@@ -283,6 +283,48 @@ TEST(Merit, a_heavy_neighbour_hides_no_velocity) {
   }
 }
 
+/// Three masses in a row, joined along it, each on a contact; the first and the last are pulled
+/// apart.
+GlobalProblem pulled_row() {
+  GlobalProblem problem;
+  problem.spacedim = 2;
+  problem.M = Matrix::from_eigen(SparseColumns(Eigen::MatrixXd::Identity(6, 6).sparseView()));
+  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(6, 6);
+  Eigen::MatrixXd g = Eigen::MatrixXd::Zero(6, 2);
+  for (Index body = 0; body < 3; ++body) {
+    h(2 * body + 1, 2 * body) = 1;  // N upwards
+    h(2 * body, 2 * body + 1) = 1;
+  }
+  for (Index joint = 0; joint < 2; ++joint) {
+    g(2 * joint, joint) = -1;
+    g(2 * joint + 2, joint) = 1;
+  }
+  problem.H = Matrix::from_eigen(h.sparseView());
+  problem.G = Matrix::from_eigen(g.sparseView());
+  problem.f = Vector{{-1, -1, 0, 0, 1, -1}};
+  problem.b = Vector::Zero(2);
+  problem.w = Vector::Zero(6);
+  problem.mu = Vector::Constant(3, 0.5);
+  return problem;
+}
+
+TEST(Merit, rounding_where_neighbours_hold_a_body_is_no_mistake) {
+  // the middle has neither velocity nor force of its own: the tension of the joints passes it
+  const GlobalProblem problem = pulled_row();
+  Solution solution{.v = Vector::Zero(6),
+                    .u = Vector::Zero(6),
+                    .r = Vector{{1, 0, 0, 0, 1, 0}},
+                    .l = Vector{{-1, -1}}};
+  EXPECT_EQ(merit(problem, solution).error, 0);
+  for (const double error : {1e-13, 1e-3}) {
+    Solution moved = solution;
+    moved.v[2] = moved.u[3] = error;
+    EXPECT_GT(merit(problem, moved).dynamics, 0.1 * error);
+    EXPECT_LT(merit(problem, moved).error, 10 * error);
+    EXPECT_GT(merit(problem, moved).bilateral, 0.1 * error);
+  }
+}
+
 TEST(Merit, an_error_is_not_relative_to_less_than_the_rounding_of_q) {
   // in free flight: the base alone moves, what a joint at its limit feels of it is rounding
   GlobalProblem problem = light_beside_heavy(1);

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fclib
+from fclib.analysis._conventions import conventions
 from fclib.scenes import assemblies
 from fclib.scenes.shared import assembly
 
@@ -87,6 +88,12 @@ def test_shifted_problem_is_the_law_with_cohesion(kind: str) -> None:
     assert np.all(tangential <= own.mu * (r[:, 0] + glue) + 1e-7 * glue)
     slides = np.linalg.norm(u[:, 1:], axis=1) > 1e-5 * scale
     np.testing.assert_allclose(tangential[slides], own.mu * (r[slides, 0] + glue), atol=1e-5 * glue)
+
+
+@pytest.mark.parametrize("kind", ["tower", "pushed"])
+def test_the_normal_of_a_glued_block_is_first(kind: str) -> None:
+    # W has equal entries for N and T1 there, as a round body for both tangents
+    assert conventions(family("CohesiveWall").of_kind(kind, 100, 0.9)) == []
 
 
 def test_wall_without_glue_is_the_plain_one() -> None:

@@ -5,14 +5,16 @@ another problem. That one may be solved with an error of 0 while bodies fall thr
 There are two signs; contacts with the normal first do not have both:
 
 - components close (q < 0, for example by gravity), but the first one does not;
-- on W's diagonal, a round body has equal entries for T1 and T2, and another one for N.
+- of a round body, the contact's block of W is diagonal, with equal entries for T1 and T2, and
+  another one for N. At a corner of a block it is not diagonal.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from fclib import _core, _laws, _solve
 from fclib.analysis._data import columns
@@ -41,11 +43,13 @@ def conventions(problem: _solve.Problem) -> list[str]:
         local = problem
     d, nc = local.spacedim, local.nc
     force = _laws.of_force(local.kind, d)
-    diagonal = columns(local.W).diagonal().reshape(nc, d)[:, :force]
+    W = columns(local.W)
+    diagonal = W.diagonal().reshape(nc, d)[:, :force]
+    coupled = largest_beside(W, d, force)
     q = np.asarray(local.q).reshape(nc, d)[:, :force]
     # limits have no tangents
     whole = (diagonal > 0).all(axis=1)
-    diagonal, q = diagonal[whole], q[whole]
+    diagonal, q, coupled = diagonal[whole], q[whole], coupled[whole]
     if not len(q):
         return []
     closes = (q < -SMALL * np.abs(q).max()).mean(axis=0)
@@ -61,7 +65,8 @@ def conventions(problem: _solve.Problem) -> list[str]:
             continue
         near = np.abs(diagonal[:, 0] - diagonal[:, other]) <= EQUAL * diagonal[:, 0]
         far = np.abs(diagonal[:, 0] - diagonal[:, k]) > DIFFERENT * diagonal[:, 0]
-        round_ones = (near & far).sum()
+        apart = coupled <= EQUAL * diagonal[:, 0]
+        round_ones = (near & far & apart).sum()
         if round_ones >= MOST * count:
             return [
                 f"component {k + 1} has an entry of its own on the diagonal of W, and W_NN is that"
@@ -69,3 +74,14 @@ def conventions(problem: _solve.Problem) -> list[str]:
                 " first?"
             ]
     return []
+
+
+def largest_beside(W: Any, d: int, force: int) -> npt.NDArray[np.float64]:
+    """The largest size of an entry beside the diagonal of each contact's block of forces."""
+    entries = W.tocoo()
+    row, column = entries.row, entries.col
+    same = row // d == column // d
+    beside = same & (row != column) & (row % d < force) & (column % d < force)
+    found = np.zeros(W.shape[0] // d)
+    np.maximum.at(found, row[beside] // d, np.abs(entries.data[beside]))
+    return found

@@ -81,7 +81,7 @@ def read(path: Path, time_step: float, gravity: float) -> Read:
         import h5py
     except ImportError as error:
         raise ImportError(
-            f"{path}: h5py reads a scene of Siconos, and is missing: pip install h5py"
+            f"{path}: h5py reads a scene of Siconos, and is missing: pip install 'fclib[simulate]'"
         ) from error
     with h5py.File(path, "r") as file:
         data = file.get("data")

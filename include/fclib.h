@@ -676,6 +676,13 @@ struct fclib_geometry {
   int planar;                 /**< 1 if all moves in the plane x, z */
   const char* unit;           /**< of lengths, or NULL: m */
   const char* mass_unit;      /**< of masses, or NULL: kg */
+  const double* mass;         /**< (nb) of each rigid body, 0 if it is fixed, or NULL */
+  const double* inertia;      /**< (nb x 3) principal moments about its centre, or NULL */
+  const double* center;       /**< (nb x 3) centre of mass in its frame, or NULL */
+  const double* axes;         /**< (nb x 4) turn of its principal axes in its frame, or NULL */
+  int n;                      /**< components of velocity and impulse, 0 without them */
+  const double* velocity;     /**< (n) generalised, at the start of the step, or NULL */
+  const double* impulse;      /**< (n) of all known forces, f = M velocity + impulse, or NULL */
 };
 
 /** New. Adds a geometry to a file that has a problem of nc contacts. Returns 1. Returns 0 if

@@ -389,6 +389,14 @@ struct Geometry {
   bool planar = false;
   std::string unit{};       ///< of lengths, empty for m
   std::string mass_unit{};  ///< of masses, empty for kg
+  // of each rigid body
+  std::span<const double> mass{};     ///< (nb) or none; 0 if it is fixed
+  std::span<const double> inertia{};  ///< (nb x 3) or none: principal moments about its centre
+  std::span<const double> center{};   ///< (nb x 3) or none: centre of mass in its frame
+  std::span<const double> axes{};     ///< (nb x 4) or none: turn of its principal axes in its frame
+  // of the step
+  std::span<const double> velocity{};  ///< (n) or none: generalised, at its start
+  std::span<const double> impulse{};   ///< (n) or none: of all known forces, f = M velocity + impulse
 };
 
 namespace detail {
@@ -442,6 +450,14 @@ auto with_view(const Geometry& geometry, const Call& call) {
   c.planar = geometry.planar ? 1 : 0;
   c.unit = geometry.unit.empty() ? nullptr : geometry.unit.c_str();
   c.mass_unit = geometry.mass_unit.empty() ? nullptr : geometry.mass_unit.c_str();
+  c.mass = array("mass", geometry.mass, nb);
+  c.inertia = array("inertia", geometry.inertia, 3 * nb);
+  c.center = array("center", geometry.center, 3 * nb);
+  c.axes = array("axes", geometry.axes, 4 * nb);
+  const std::size_t n = std::max(geometry.velocity.size(), geometry.impulse.size());
+  c.n = detail::count(n);
+  c.velocity = array("velocity", geometry.velocity, n);
+  c.impulse = array("impulse", geometry.impulse, n);
   return call(c);
 }
 

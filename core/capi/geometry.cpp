@@ -200,6 +200,13 @@ Geometry geometry_of(const fclib_geometry& c) {
   if (c.planar != 0) bodies.put("planar", Integers{1});
   if (c.unit != nullptr) bodies.put("unit", std::string(c.unit));
   if (c.mass_unit != nullptr) bodies.put("mass_unit", std::string(c.mass_unit));
+  if (c.mass != nullptr) bodies.numbers("mass", c.mass, body_count, 1);
+  if (c.inertia != nullptr) bodies.numbers("inertia", c.inertia, body_count, 3);
+  if (c.center != nullptr) bodies.numbers("center", c.center, body_count, 3);
+  if (c.axes != nullptr) bodies.numbers("axes", c.axes, body_count, 4);
+  const std::size_t components = size_of(c.n, "geometry->n");
+  if (c.velocity != nullptr) bodies.numbers("velocity", c.velocity, components, 1);
+  if (c.impulse != nullptr) bodies.numbers("impulse", c.impulse, components, 1);
 
   Columns contacts("contacts", geometry.contacts);
   const Integers body = contacts.integers("body", c.body, contact_count, 2, 0, c.nb);

@@ -259,6 +259,24 @@ static void geometry(void) {
   struct fclib_options* again = fclib_options_create();
   CHECK(fclib_options_set_text(again, "mode", "replace"));
   CHECK(fclib_write_geometry_with(&g, path_of("geometry"), again));
+
+  /* masses, and what f is made of; a client that was compiled before has none */
+  double mass[] = {0, 2}, inertia[] = {0, 0, 0, 0.1, 0.1, 0.1}, center[] = {0, 0, 0, 0, 0, 0},
+         axes[] = {1, 0, 0, 0, 1, 0, 0, 0}, velocity[] = {0, 0, -1}, impulse[] = {0, 0, NAN};
+  g.mass = mass;
+  g.inertia = inertia;
+  g.center = center;
+  g.axes = axes;
+  g.n = 3;
+  g.velocity = velocity;
+  g.impulse = impulse;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/impulse[2]: the value is not a finite number");
+  g.size = offsetof(struct fclib_geometry, mass);
+  CHECK(fclib_write_geometry_with(&g, path_of("geometry"), again));
+  g.size = sizeof g;
+  impulse[2] = -0.02;
+  CHECK(fclib_write_geometry_with(&g, path_of("geometry"), again));
   body[1] = 2;
   CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
   SAYS("/contacts/body[1]: is 2, but must be 0 to 1");

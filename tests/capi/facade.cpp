@@ -169,6 +169,13 @@ void pictures(const std::string& path) {
                            .shape_size = size};
   fclib::write_geometry(path, geometry);
   THROWS("is in the file already", fclib::write_geometry(path, geometry));
+  geometry.mass = up;
+  THROWS("mass has 3 entries, expected 2", fclib::write_geometry(path, geometry));
+  geometry.mass = {};
+  geometry.velocity = up;
+  geometry.impulse = place;
+  THROWS("velocity has 3 entries, expected 6", fclib::write_geometry(path, geometry));
+  geometry.velocity = geometry.impulse = {};
   geometry.place = up;
   THROWS("place has 3 entries, expected 6", fclib::write_geometry(path, geometry));
   geometry.place = {};

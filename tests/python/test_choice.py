@@ -73,7 +73,7 @@ def population() -> list[dict[str, Any]]:
     for family in range(60):
         law = "rolling" if family % 5 == 0 else "Coulomb"
         planar = float(family % 10 in (5, 6))
-        for number in range(14):
+        for number in range(select.MEASURED):
             # the sizes of each family reach over all classes
             contacts = int(10 ** random.uniform(0, 4.7))
             row = candidate(f"some/F{family:02d}/{number:04d}", nc=contacts, law=law, planar=planar)
@@ -108,6 +108,21 @@ def test_copies_near_ones_and_trivial_ones_are_left_out_with_their_reasons() -> 
         "trivial: r = 0 is a solution",
         "",
     ]
+
+
+def test_twelve_of_a_family_are_measured_and_they_are_apart() -> None:
+    rows = [candidate(f"a/A/{k:04d}") for k in range(30)] + [candidate("b/B/0000")]
+    words = select.not_measured(rows)
+    stay = [k for k, word in enumerate(words) if not word]
+    assert len(stay) == select.MEASURED + 1
+    assert stay[-1] == 30
+    (word,) = set(words) - {""}
+    assert word == "not measured: of A, 12 others are farther apart"
+    place = np.array([[x, 0.0] for x in (0, 1, 2, 10, 11, 21)])
+    assert features.farthest(place, 3) == [0, 3, 5]
+    assert features.farthest(place, 6) == list(range(6))
+    # none is left out by its data
+    assert not any(select.left_out(rows))
 
 
 def test_a_chain_of_near_ones_keeps_every_other_one() -> None:
@@ -546,6 +561,10 @@ def test_a_sequence_has_consecutive_states(tmp_path: Path) -> None:
     numbers = sequences.window(own, 100)
     assert numbers is not None
     assert (numbers[0], len(numbers)) == (707, 100)
+    # candidates are spread over all 1,514 problems; here it is these steps that are looked at
+    rows = sequences.describe([own, "machines/Rover"], sequences.Rule(), tmp_path)
+    assert [row["number"] for row in rows] == [*candidates.spread(numbers, sequences.SAMPLE)]
+    assert rows == sequences.describe([own], sequences.Rule(), tmp_path)
     assert sequences.window("machines/Rover", 100) is None
     # every third step, and of these what is hard
     assert sequences.window("rt444/KaplasTower", 100) is None

@@ -45,7 +45,7 @@ def find_candidates(
         str | None, typer.Option(help="Store the CPU of each family as docs/results/NAME.csv.")
     ] = None,
 ) -> None:
-    """Describe candidates of all families, and write a file for each that stays.
+    """Describe candidates of all families, and write a file for each that is measured.
 
     Families without stored states are simulated. It goes on after a kill. Families that changed, or
     are new, are described anew.
@@ -62,7 +62,7 @@ def find_candidates(
         count = difficulty.write_problems(folder, rows)
     except difficulty.FAULTS as error:
         fail(str(error))
-    out.print(f"{count} of {len(rows)} candidates stay:  {folder / 'problems'}", highlight=False)
+    out.print(f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}", highlight=False)
     for name, reason in failed.items():
         err.print(f"{name}: has no candidates: {reason}", style="red", highlight=False)
     if results:
@@ -169,15 +169,25 @@ def choose_sets(
 
 @app.command("sequences")
 def choose_sequences(
-    folder: Folder, target: Lists, version: Version, states: States = None
+    folder: Folder,
+    target: Lists,
+    version: Version,
+    states: States = None,
+    names: Annotated[
+        list[str] | None, typer.Option("--family", help="Only these SET/FAMILY.")
+    ] = None,
 ) -> None:
-    """Choose the simulations of the set sequences; those without stored states are simulated."""
+    """Choose the simulations of the set sequences; those without stored states are simulated.
+
+    It goes on after a kill.
+    """
     rule = sequences.Rule()
     target.mkdir(parents=True, exist_ok=True)
     try:
-        chosen = sequences.choose(select.read_table(folder / difficulty.TABLE), rule)
         choices = []
         with many_bars() as bars:
+            rows = sequences.describe(names or candidates.folders(), rule, folder, bars)
+            chosen = sequences.choose(rows, rule)
             for own, numbers in chosen:
                 found = sequences.states_of(own, numbers, folder / "sequences", bars)
                 mine = sequences.choices_of(found)

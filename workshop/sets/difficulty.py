@@ -2,7 +2,7 @@
 
     DIR/candidates.csv        a row for each candidate (select.py)
     DIR/costs.csv             CPU of each family: its simulation, and its rows
-    DIR/problems/FAMILY/      a file for each candidate that stays
+    DIR/problems/FAMILY/      a file for each candidate that is measured
     DIR/difficult/FAMILY/     links to those that few solve within the shorter limit
     DIR/difficulty.sqlite, DIR/difficulty-long.sqlite     the stores of both campaigns
 
@@ -119,10 +119,10 @@ def write_costs(path: Path, costs: Mapping[str, float]) -> None:
 
 
 def write_problems(folder: Path, rows: Sequence[select.Row]) -> int:
-    """Write a file for each candidate that stays; remove those of others. Return their number."""
+    """Write a file for each candidate that is measured; remove others. Return their number."""
     wanted = {
         path_of(folder, row): row
-        for row, words in zip(rows, select.left_out(rows), strict=True)
+        for row, words in zip(rows, select.not_measured(rows), strict=True)
         if not words
     }
     for path in (folder / "problems").glob("*/*.hdf5"):

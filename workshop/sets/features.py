@@ -158,6 +158,22 @@ def nearly_same(rows: Sequence[Mapping[str, Any]], bound: float = NEAR) -> list[
     return found
 
 
+def farthest(place: Array, most: int) -> list[int]:
+    """Points that are far apart, at most so many, in order.
+
+    The first is the one nearest to the middle of all, each further one the farthest from those
+    before it.
+    """
+    if len(place) <= most:
+        return list(range(len(place)))
+    found = [int(np.linalg.norm(place - place.mean(axis=0), axis=1).argmin())]
+    apart = np.full(len(place), np.inf)
+    while len(found) < most:
+        apart = np.minimum(apart, np.linalg.norm(place - place[found[-1]], axis=1))
+        found.append(int(apart.argmax()))
+    return sorted(found)
+
+
 def column(rows: Sequence[Mapping[str, Any]], name: str, log: bool, least: float) -> Array:
     """A feature of all rows, with mean 0 and deviation 1."""
     values = np.array([np.nan if row.get(name) is None else float(row[name]) for row in rows])

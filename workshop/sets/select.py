@@ -7,7 +7,8 @@ without the problems and without a run, and equal tables give equal choices.
 
 1. A candidate is left out if it has the same data as an earlier one, if it is nearly the same in
    the space of features (`features.NEAR`), if it is trivial (r = 0 is a solution, or `nsgs` takes
-   at most SWEEPS sweeps), or if it is too large.
+   at most SWEEPS sweeps), or if it is too large. Of what stays, MEASURED of a family are measured:
+   those that are farthest apart.
 2. `standard`: the candidates that stay are clustered. An integer program takes problems of as many
    clusters as it can, within the bounds of `Rule`. If a lower bound cannot be met together with the
    others, as little as possible is lacking, and it is told. Among equal choices it takes problems
@@ -45,6 +46,9 @@ Row = Mapping[str, Any]
 CONTACTS: Final = 200_000  # largest number in a candidate; 10 s of CPU are ten products with W
 ENTRIES: Final = 5_000_000  # largest number of entries of its M
 SWEEPS: Final = 20  # a problem that nsgs solves with no more sweeps is trivial
+# Largest number of problems of a family that are measured. Sets take at most six. Each costs up to
+# 160 s: a run of 10 s by eight solvers, twice.
+MEASURED: Final = 12
 SHORT, LONG = 10.0, 60.0  # [s] of CPU a run, the two limits
 TEXTS: Final = ("problem", "label", "scene", "digest", "law", "left_out", "best_by", "set", "why")
 SETS: Final = ("standard", "hard", "open")
@@ -172,8 +176,24 @@ def describes(rows: Sequence[Row], found: Candidates) -> bool:
     )
 
 
+def not_measured(rows: Sequence[Row]) -> list[str]:
+    """Why each candidate is not measured; empty for those that are."""
+    found = left_out(rows)
+    own: dict[str, list[int]] = defaultdict(list)
+    for k, words in enumerate(found):
+        if not words:
+            own[rows[k]["scene"]].append(k)
+    place = features.points(rows)
+    for scene, places in own.items():
+        inside = {places[k] for k in features.farthest(place[places], MEASURED)}
+        for k in places:
+            if k not in inside:
+                found[k] = f"not measured: of {scene}, {MEASURED} others are farther apart"
+    return found
+
+
 def left_out(rows: Sequence[Row]) -> list[str]:
-    """Why each candidate is left out before anything is measured; empty for those that stay."""
+    """Why each candidate is left out by its data; empty for those that stay."""
     found = [str(row.get("left_out") or "") for row in rows]
     first: dict[str, str] = {}
     for k, row in enumerate(rows):
@@ -285,7 +305,7 @@ class Chosen:
 
 def choose(rows: Sequence[Row], rule: Rule) -> Chosen:
     """The sets `standard`, `hard` and `open` from a table of measured candidates."""
-    why = left_out(rows)
+    why = not_measured(rows)
     chosen = Chosen([""] * len(rows), why)
     for k, row in enumerate(rows):
         if why[k]:
@@ -516,7 +536,7 @@ def clusters(place: features.Array, most: int) -> npt.NDArray[np.int64]:
 
 def counts_of(chosen: Chosen) -> list[dict[str, Any]]:
     """How many candidates there are, and what became of them."""
-    kinds = ("the same data", "nearly the same", "trivial", "too large")
+    kinds = ("the same data", "nearly the same", "trivial", "too large", "not measured")
     outcome: Counter[str] = Counter()
     for name, words in zip(chosen.set, chosen.why, strict=True):
         outcome[name or next((kind for kind in kinds if words.startswith(kind)), "others")] += 1

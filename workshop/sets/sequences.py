@@ -1,9 +1,11 @@
 """The set `sequences`: simulations of many steps, for solvers that start from the step before.
 
-Of each simulation the consecutive problems in its middle are taken, if enough of the candidates
-among them differ and are not trivial: a stack at rest is the same problem again and again. Of these
-simulations those are chosen that are farthest apart in the space of features (each is the mean of
-its candidates), at most one of a scene. The first is the one nearest to the middle of all.
+Of each simulation the consecutive problems in its middle are taken, if enough of them differ and
+are not trivial: a stack at rest is the same problem again and again. SAMPLE of them are looked at:
+the candidates of the other sets are spread over the whole simulation, and few of them are in its
+middle. Of these simulations those are chosen that are farthest apart in the space of features (each
+is the mean of its sample), at most one of a scene. The first is the one nearest to the middle of
+all.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,18 +24,26 @@ from fclib.collections.set_index import Choice
 from workshop.sets import candidates, features, select
 
 
+SAMPLE: Final = 12  # problems of a sequence that are looked at, at equal distances
+TABLE: Final = "sequences.csv"  # their rows, as in the table of candidates
+
+
 @dataclass(frozen=True)
 class Rule:
     """What a sequence is, and how many there are."""
 
     count: int = 12
     steps: int = 100
-    telling: float = 0.5  # least share of the candidates among its steps that stay
-    least: int = 3  # least number of them
+    telling: float = 0.5  # least share of the sample that differs and is not trivial
 
     def record(self) -> dict[str, Any]:
         """In JSON's types."""
-        return {**vars(self), "near": features.NEAR, "sweeps": select.SWEEPS}
+        return {
+            **vars(self),
+            "sample": SAMPLE,
+            "near": features.NEAR,
+            "sweeps": select.SWEEPS,
+        }
 
 
 def window(folder: str, steps: int) -> range | None:
@@ -54,6 +64,32 @@ def window(folder: str, steps: int) -> range | None:
     return numbers
 
 
+def describe(
+    names: Sequence[str], rule: Rule, where: Path, progress: candidates.Progress | None = None
+) -> list[select.Row]:
+    """The rows of the sequences of folders SET/FAMILY; those without stored states are simulated.
+
+    The table in the folder is written after each. So it goes on after a kill. Families whose rows
+    it has, and that have not changed, are left as they are.
+    """
+    table = where / TABLE
+    rows: list[select.Row] = [*select.read_table(table)] if table.is_file() else []
+    for own in names:
+        numbers = window(own, rule.steps)
+        if numbers is None:
+            continue
+        found = states_of(own, numbers, where / "sequences", progress)
+        sample = replace(found, numbers=candidates.spread(numbers, SAMPLE))
+        there = [row for row in rows if select.folder_of(row) == own]
+        if not select.describes(there, sample):
+            rows = [row for row in rows if select.folder_of(row) != own]
+            rows += select.described(sample, progress)
+            select.write_table(table, rows)
+    # by the stored digits, as candidates are
+    there = [*select.read_table(table)] if table.is_file() else []
+    return [row for row in there if select.folder_of(row) in names]
+
+
 def choose(rows: Sequence[select.Row], rule: Rule) -> list[tuple[str, range]]:
     """The folders SET/FAMILY that are chosen, and the numbers of their problems."""
     out = select.left_out(rows)
@@ -68,7 +104,7 @@ def choose(rows: Sequence[select.Row], rule: Rule) -> list[tuple[str, range]]:
             continue
         inside = [k for k in places if int(rows[k]["number"]) in numbers]
         telling = [k for k in inside if not out[k]]
-        if len(telling) >= max(rule.least, rule.telling * len(inside)):
+        if telling and len(telling) >= rule.telling * len(inside):
             found[folder] = numbers, point[telling].mean(axis=0)
     if not found:
         return []

@@ -396,7 +396,8 @@ struct Geometry {
   std::span<const double> axes{};     ///< (nb x 4) or none: turn of its principal axes in its frame
   // of the step
   std::span<const double> velocity{};  ///< (n) or none: generalised, at its start
-  std::span<const double> impulse{};   ///< (n) or none: of all known forces, f = M velocity + impulse
+  std::span<const double>
+      impulse{};  ///< (n) or none: of all known forces, f = M velocity + impulse
 };
 
 namespace detail {

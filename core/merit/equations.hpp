@@ -37,16 +37,16 @@ struct Equations {
 
 /// What the judgement of the equations needs and depends on the problem alone.
 struct OwnSizes {
-  RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
-  RealVector free_u;    ///< q, condensed (m) [m/s]
-  RealVector l;         ///< reactions that stop the joints, each joint alone (p)
-  RealVector least_l;   ///< the same, for the velocity least_joint at each; of a global problem (p)
+  RealVector free;     ///< M^-1 f of a global problem (n) [m/s]
+  RealVector free_u;   ///< q, condensed (m) [m/s]
+  RealVector l;        ///< reactions that stop the joints, each joint alone (p)
+  RealVector least_l;  ///< the same, for the velocity least_joint at each; of a global problem (p)
   Real least_joint = 0;  ///< root mean square of s, condensed, of a global problem [m/s]
-  RealVector q;         ///< of the terms of u without reactions (m) [m/s]
-  RealVector rounding;  ///< what double precision leaves of the terms that q is made of (m)
-                        ///< [m/s]; empty if q is given
-  RealVector scale;     ///< tr(W_aa) / d of each contact (nc)
-  RealVector rho;       ///< of the scaled natural map, for each contact (nc) [1/W]
+  RealVector q;          ///< of the terms of u without reactions (m) [m/s]
+  RealVector rounding;   ///< what double precision leaves of the terms that q is made of (m)
+                         ///< [m/s]; empty if q is given
+  RealVector scale;      ///< tr(W_aa) / d of each contact (nc)
+  RealVector rho;        ///< of the scaled natural map, for each contact (nc) [1/W]
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);

@@ -62,7 +62,8 @@ def find_candidates(
         count = difficulty.write_problems(folder, rows)
     except difficulty.FAULTS as error:
         fail(str(error))
-    out.print(f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}", highlight=False)
+    words = f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}"
+    out.print(words, highlight=False)
     for name, reason in failed.items():
         err.print(f"{name}: has no candidates: {reason}", style="red", highlight=False)
     if results:

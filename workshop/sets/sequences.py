@@ -23,7 +23,6 @@ from fclib.collections import set_index, trajectory
 from fclib.collections.set_index import Choice
 from workshop.sets import candidates, features, select
 
-
 SAMPLE: Final = 12  # problems of a sequence that are looked at, at equal distances
 TABLE: Final = "sequences.csv"  # their rows, as in the table of candidates
 

@@ -110,8 +110,7 @@ Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
     reduced.u = h.transpose() * v + problem.w;
     const Vector s = g.transpose() * free + b;
     if (given.v.size() > 0) {
-      const Vector contacts =
-          by_contact(sizes(h.transpose(), free) + problem.w.cwiseAbs(), d);
+      const Vector contacts = by_contact(sizes(h.transpose(), free) + problem.w.cwiseAbs(), d);
       Vector stop = sizes(h, stopping(at_least(contacts, reduced.q)));
       if (mixed) {
         const Vector inertia = (g.transpose() * inverse * g).diagonal();
@@ -121,8 +120,8 @@ Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
       result.dynamics = worst(v - follows, fastest.cwiseMax((inverse * stop).cwiseAbs()));
     }
     if (mixed) {
-      result.bilateral = worst(g.transpose() * v + b,
-                               at_least(sizes(g.transpose(), fastest) + b.cwiseAbs(), s));
+      result.bilateral =
+          worst(g.transpose() * v + b, at_least(sizes(g.transpose(), fastest) + b.cwiseAbs(), s));
     }
     if (given.u.size() > 0) {
       const Vector velocity = by_contact(sizes(h.transpose(), fastest) + problem.w.cwiseAbs(), d);

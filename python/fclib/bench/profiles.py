@@ -56,6 +56,7 @@ from fclib.bench.comparison import (
     one_limit,
     pair_forms,
     runs_of,
+    set_of,
     solved_in,
     table_of,
     words_in,
@@ -111,6 +112,7 @@ def load(
     store: str | Path,
     *,
     campaign: str | None = None,
+    sets: Sequence[str] = (),
     families: Sequence[str] = (),
     solvers: Sequence[str] = (),
     tolerances: Sequence[float] = (),
@@ -124,6 +126,7 @@ def load(
     Args:
         store: file of the store.
         campaign: only its runs.
+        sets: only problems of these, by the folders of their files: SET/FAMILY/NUMBER-FORM.hdf5.
         families: only problems of these.
         solvers: only these, by their labels, in this order.
         tolerances: only these.
@@ -147,6 +150,7 @@ def load(
     runs = _name_machines(runs)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
+        ("set", sets),
         ("family", families),
         ("solver", solvers),
         ("tol", tolerances),
@@ -162,7 +166,7 @@ def load(
                 there = own.present() if isinstance(own, Words) else np.unique(own).tolist()
                 raise ProfileError(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
-                    f" there is: {', '.join(sorted(map(str, there)))}"
+                    f" there is: {', '.join(sorted(str(one or '?') for one in there))}"
                 )
             runs = kept(runs, fits)
     nodes = sorted({name or "?" for name in words_in(runs, "node").present()})
@@ -186,11 +190,12 @@ def load(
 
 
 def read(store: Store, more: Sequence[str] = ()) -> Table:
-    """All runs of a store; `same_as` gives the global form of each local form."""
+    """All runs of a store, with their `set`; `same_as` is the global form of each local form."""
     runs = store.table(more=("path", *more))
     runs = Table({name: runs[name] for name in runs.names if name not in UNREAD})
     if not len(runs):
         return runs
+    runs = runs.with_columns(set=words_in(runs, "path").map(set_of))
     _, first = runs.numbers("hash")
     pairs = pair_forms(iter(runs.where(first)))
     declared = words_in(runs, "same_as")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def test_curves_are_told_apart_without_colours() -> None:
     seen = {(str(one["linestyle"]), one["marker"]) for one in strokes}
     assert len(seen) == len(strokes)
     # no two beside each other in the legend share either
-    for one, other in zip(strokes, strokes[1:], strict=False):
+    for one, other in itertools.pairwise(strokes):
         assert one["linestyle"] != other["linestyle"]
         assert one["marker"] != other["marker"]
 

@@ -124,7 +124,9 @@ def command(
     Prints tables. With --out it draws pictures too. With --figure it draws one for a paper.
     """
     if figure and (out_dir or as_json):
-        raise typer.BadParameter("--figure makes one figure, and no tables: leave out --out, --json")
+        raise typer.BadParameter(
+            "--figure makes one figure, and no tables: leave out --out, --json"
+        )
     chosen: dict[str, Any] = {
         "sets": of_set or (),
         "families": family or (),

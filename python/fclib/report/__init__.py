@@ -24,8 +24,8 @@ libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError
 assets/        the pages themselves: HTML, CSS, JavaScript; pages/ has a file for each kind of page
 
-site.py needs all others but paper.py and figure.py; drawings.py needs view.py and picture.py, these two
-solids.py, and view.py network.py; paper.py needs runs.py, figure.py citing.py.
+site.py needs all others but paper.py and figure.py; drawings.py needs view.py and picture.py, these
+two solids.py, and view.py network.py; paper.py needs runs.py, figure.py citing.py.
 """
 
 from fclib.report.error import ReportError

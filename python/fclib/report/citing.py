@@ -82,6 +82,14 @@ def papers_of(citation: str) -> list[dict[str, str]]:
     return found
 
 
+def of_solver(name: str, title: str, citation: str, origin: str, version: str) -> list[str]:
+    """What to cite of a solver: its papers; itself if it has none or is of another package."""
+    papers = [paper["bibtex"] for paper in papers_of(citation)]
+    if papers and origin == "fclib":
+        return papers
+    return [*papers, implementation(name, title, f"{origin} {version}".strip())]
+
+
 def software() -> str:
     """BibTeX of this software, from CITATION.cff."""
     return SOFTWARE.format(version=_core.version)

@@ -1,8 +1,8 @@
 """One figure for a paper, with its caption in LaTeX and the BibTeX of all that it is of.
 
-    curves.pdf    the figure: PDF, SVG or PGF
-    curves.tex    it in an environment of LaTeX, with a caption that cites solvers and sets
-    curves.bib    what the caption cites
+curves.pdf    the figure: PDF, SVG or PGF
+curves.tex    it in an environment of LaTeX, with a caption that cites solvers and sets
+curves.bib    what the caption cites
 """
 
 from __future__ import annotations
@@ -122,7 +122,9 @@ def environment(
 ) -> str:
     """The figure in LaTeX, with its caption."""
     kind = "figure*" if columns == 2 else "figure"
-    put = rf"\input{{{path.name}}}" if path.suffix == ".pgf" else rf"\includegraphics{{{path.stem}}}"
+    put = (
+        rf"\input{{{path.name}}}" if path.suffix == ".pgf" else rf"\includegraphics{{{path.stem}}}"
+    )
     cites = [
         rf"{latex_text(name)}~\cite{{{','.join(map(key_of, entries))}}}"
         for name, entries in named.items()
@@ -150,18 +152,18 @@ def key_of(entry: str) -> str:
 
 
 def cited_solvers(runs: Table) -> dict[str, list[str]]:
-    """The papers of each solver, and the solver itself if it is of another package or has none."""
+    """Each solver, by its label."""
     _, first = runs.numbers("solver")
     found = {}
     for row in runs.where(first):
-        about, name = object_in(row["about"]), row["solver_name"]
-        papers = citing.papers_of(str(about.get("citation", "")))
-        entries = [paper["bibtex"] for paper in papers]
-        if not entries or row["origin"] != "fclib":
-            origin = f"{row['origin'] or 'fclib'} {row['version'] or ''}".strip()
-            title = str(about.get("title", ""))
-            entries.append(citing.implementation(name, title, origin))
-        found[str(row["solver"])] = entries
+        about = object_in(row["about"])
+        found[str(row["solver"])] = citing.of_solver(
+            row["solver_name"],
+            str(about.get("title", "")),
+            str(about.get("citation", "")),
+            row["origin"] or "fclib",
+            row["version"] or "",
+        )
     return found
 
 

@@ -22,6 +22,7 @@ import commands
 import examples
 import families
 import python_api
+import ranking
 import results
 import solvers
 from sphinx.cmd.build import main as sphinx
@@ -35,6 +36,7 @@ AS_THEY_ARE = {
     "SECURITY.md": "security.md",
     "CHANGELOG.md": "changelog.md",
 }
+SCORER = "scorer.js"
 MODULE = ROOT / "build" / "wasm" / "fclib"
 MODULE_FILES = ("fclib.js", "fclib-core.mjs", "fclib-core.wasm")
 # the menu; FOLDER/* stands for the generated pages of a folder
@@ -147,6 +149,7 @@ def gather(folder: Path, quick: bool, report: str) -> None:
         else:
             path.write_text(content, encoding="utf-8")
     tables = results.Results(folder / "results")
+    texts = []
     for path in sorted(folder.rglob("*.md")):
         name = path.relative_to(folder).as_posix()
         text = path.read_text(encoding="utf-8")
@@ -161,6 +164,8 @@ def gather(folder: Path, quick: bool, report: str) -> None:
             below = sorted(p.stem for p in path.parent.glob("*.md") if p != path)
             text += toctree(below)
         path.write_text(text, encoding="utf-8")
+        texts.append((name.removesuffix(".md"), text))
+    (folder / SCORER).write_text(ranking.script(texts), encoding="utf-8")
 
 
 def toctree(entries: list[str], title: str = "") -> str:
@@ -198,6 +203,7 @@ def main(out: Path, quick: bool, report: str) -> int:
         gather(sources, quick, report)
         options = ["-b", "html", "-W", "--keep-going", "-q", "-E", "-d", f"{folder}/doctrees"]
         options += ["-c", str(HERE), "-D", f"html_static_path={sources / '_static'}"]
+        options += ["-D", f"html_search_scorer={sources / SCORER}"]
         status = sphinx([*options, str(sources), str(out)])
     if status == 0:
         print(f"{out}/index.html")

@@ -284,12 +284,25 @@ class Quiet(SimpleHTTPRequestHandler):
         pass
 
 
-def test_the_search_finds_and_formulas_are_drawn(site: Path, browser: Any) -> None:
+FIRST = {
+    "restitution": "glossary.html",
+    "Delassus matrix": "glossary.html",
+    "slurm": "bench.html",
+    "hyperplane": "solvers/variational-inequality.html#solver-hyperplane",
+}
+# Sphinx shows results one after another, and says how many when all are there
+FOUND = """/found [1-9]/.test(document.querySelector(".search-summary")?.textContent)"""
+
+
+def test_the_search_ranks_and_formulas_are_drawn(site: Path, browser: Any) -> None:
     page = browser.new_page()
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
     page.goto((site / "mathematics.html").as_uri())
     formula = page.locator("div.math math").first
     assert formula.bounding_box()["width"] > 50
-    page.goto((site / "search.html").as_uri() + "?q=hyperplane")
-    page.wait_for_selector("ul.search li a")
-    assert page.locator("ul.search li").count() > 0
+    # the page that defines a word is first, then the page that uses it most
+    for words, first in FIRST.items():
+        page.goto((site / "search.html").as_uri() + f"?q={words}")
+        page.wait_for_function(FOUND)
+        assert page.locator("ul.search li a").first.get_attribute("href").startswith(first), words
     page.close()

@@ -165,13 +165,13 @@ def opened(
     matplotlib.use("Agg", force=False)
     import matplotlib.pyplot as plt
 
-    style = {**style}
+    settings: Any = {**style}
     if "pgf" in formats:
         found = next(filter(shutil.which, TEX), None)
         if found is None:
             raise ValueError(f"PGF needs one of {', '.join(TEX)}; PDF and SVG need no TeX")
-        style |= {"pgf.texsystem": found, "pgf.rcfonts": False}
-    with plt.rc_context(style):
+        settings |= {"pgf.texsystem": found, "pgf.rcfonts": False}
+    with plt.rc_context(settings):
         drawn, axes = plt.subplots(figsize=size, layout="constrained")
         try:
             yield drawn, axes

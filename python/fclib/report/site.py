@@ -459,7 +459,7 @@ class _Writer:
         named = {row.get(key) for row in self.problems.rows for key in ("collection", "kind")}
         site["sets"] = {
             name: {"version": version(name), "bibtex": citing.set_of_problems(name)}
-            for name in sorted(named & SETS.keys())
+            for name in sorted(SETS.keys() & named)
         }
         site["colours"] = list(COLOURS)
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}

@@ -28,6 +28,7 @@ pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.slow
 
 REPORT = "https://example.org/report"
+OPTIONS = ["--quick", "--report", REPORT, "--versions", f"0.9.0,{fclib.__version__}"]
 PHONE = {"width": 390, "height": 800}
 
 
@@ -39,8 +40,11 @@ def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     """
     # a folder whose name must be escaped in an address
     folder = tmp_path_factory.mktemp("built") / "a site #1"
+    other = folder.parent / "0.9.0" / "index.html"  # of an earlier version, beside it
+    other.parent.mkdir()
+    other.touch()
     done = subprocess.run(
-        [sys.executable, root / "scripts/site/build.py", folder, "--quick", "--report", REPORT],
+        [sys.executable, root / "scripts/site/build.py", folder, *OPTIONS],
         capture_output=True,
         text=True,
     )
@@ -122,6 +126,13 @@ def test_the_menu_marks_the_way_to_the_page(site: Path, page: str, levels: str) 
         assert ("current-page" in rest, link.startswith("current")) == (last, last)
     # a part of the menu is open where the page is one of it
     assert menu.count('checked=""') == sum("has-children" in rest for _, rest, _ in marked)
+
+
+def test_each_page_leads_to_other_versions(site: Path) -> None:
+    for page, up in (("bench", ".."), ("families/Arch", "../..")):
+        text = (site / f"{page}.html").read_text()
+        assert f'<a href="{up}/0.9.0/index.html">0.9.0</a>' in text
+        assert f"<b>{fclib.__version__}</b>" in text
 
 
 def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:

@@ -25,6 +25,7 @@ from fclib.collections import catalog, families, read_catalog, sets
 from fclib.report import build_site
 from fclib.report.view import as_json
 from workshop.tables import _results
+from workshop.tables.report_size import ANSWER, busy
 
 REPEATS = 5  # times that each page is opened
 FILTER = "masonry contacts > 50 class = hard"
@@ -50,10 +51,26 @@ def many(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
     return found
 
 
-def busy(tools: Any) -> float:
-    """Seconds that the page's thread has computed."""
-    metrics = tools.send("Performance.getMetrics")["metrics"]
-    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+def opened(site: Path) -> dict[str, tuple[float, float]]:
+    """Seconds, and of CPU, until a page is there or the filter has answered; the least of all."""
+    from playwright.sync_api import sync_playwright
+
+    found: dict[str, list[int]] = defaultdict(list)
+    for place, row in enumerate(rows):
+        paths = (site / "data" / "views" / f"{place}.js", site / "thumbs" / f"{place}.webp")
+        found[row["family"]].append(sum(path.stat().st_size for path in paths if path.is_file()))
+    return {family: mean(own) for family, own in found.items()}
+
+
+def many(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
+    """So many rows, of the given ones in turn, each with a name of its own and without files."""
+    nothing = dict.fromkeys(("global_file", "local_file", "global_sha256", "local_sha256"))
+    found = []
+    for k in range(count):
+        row = rows[k % len(rows)]
+        name = f"extended/{row['family']}/{k:05d}"
+        found.append({**row, **nothing, "id": name, "number": k, "local_file": f"{name}.hdf5"})
+    return found
 
 
 def opened(site: Path) -> dict[str, tuple[float, float]]:
@@ -95,7 +112,7 @@ def opened(site: Path) -> dict[str, tuple[float, float]]:
                 note(name, tools, open_page)
                 page.wait_for_timeout(1000)  # nobody types before
                 for text in (FILTER, f"{FILTER} arch") if name == "catalogue" else ():
-                    note("filter", tools, lambda page=page, text=text: page.evaluate(answer, text))
+                    note("filter", tools, lambda page=page, text=text: page.evaluate(ANSWER, text))
                 page.close()
         browser.close()
     return {

@@ -154,8 +154,9 @@
       pair,
     );
 
+    // a report without a catalogue knows no sets
     const setOf = (k) =>
-      s.sets[cat.read.collection?.(k)] ? cat.read.collection(k) : cat.read.kind(k);
+      [cat.read.collection?.(k), cat.read.kind?.(k)].find((name) => s.sets[name]) ?? "";
     const isMeant = (k) =>
       !state.family ||
       state.family === (state.family.startsWith(SET) ? SET + setOf(k) : cat.read.family(k));
@@ -274,7 +275,7 @@
       const failed = values.flat().filter((v) => v === Infinity).length;
       const had = values.flat().filter((v) => !Number.isNaN(v)).length;
       const solvers = order.map((k) => s.solvers[k]);
-      const sets = [...new Set(rows.map(setOf))].filter((name) => s.sets[name]).sort();
+      const sets = [...new Set(rows.map(setOf))].filter(Boolean).sort();
       const families = new Set(rows.map((k) => cat.read.family(k)));
       return {
         title: TITLES[state.kind],

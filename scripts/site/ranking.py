@@ -23,7 +23,8 @@ const DEFINED = %(defined)s; // words of the glossary's terms
 const USED = %(used)s; // the pages that use a word most
 const asked = (new URLSearchParams(location.search).get("q") || "").toLowerCase();
 const words = asked.match(/[a-zé]{3,}/g) || [];
-const isDefined = DEFINED.some((term) => words.length && words.every((word) => term.includes(word)));
+const has = (term) => words.length && words.every((word) => term.includes(word));
+const isDefined = DEFINED.some(has);
 // a browser gives a page no text of other files
 if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 var Scorer = {

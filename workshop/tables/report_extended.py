@@ -55,37 +55,6 @@ def opened(site: Path) -> dict[str, tuple[float, float]]:
     """Seconds, and of CPU, until a page is there or the filter has answered; the least of all."""
     from playwright.sync_api import sync_playwright
 
-    found: dict[str, list[int]] = defaultdict(list)
-    for place, row in enumerate(rows):
-        paths = (site / "data" / "views" / f"{place}.js", site / "thumbs" / f"{place}.webp")
-        found[row["family"]].append(sum(path.stat().st_size for path in paths if path.is_file()))
-    return {family: mean(own) for family, own in found.items()}
-
-
-def many(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
-    """So many rows, of the given ones in turn, each with a name of its own and without files."""
-    nothing = dict.fromkeys(("global_file", "local_file", "global_sha256", "local_sha256"))
-    found = []
-    for k in range(count):
-        row = rows[k % len(rows)]
-        name = f"extended/{row['family']}/{k:05d}"
-        found.append({**row, **nothing, "id": name, "number": k, "local_file": f"{name}.hdf5"})
-    return found
-
-
-def opened(site: Path) -> dict[str, tuple[float, float]]:
-    """Seconds, and of CPU, until a page is there or the filter has answered; the least of all."""
-    from playwright.sync_api import sync_playwright
-
-    answer = """async (text) => {
-      const field = document.querySelector("main input[type=search]");
-      const said = document.querySelector("main [role=status]"), before = said.textContent;
-      const start = performance.now();
-      field.value = text;
-      field.dispatchEvent(new Event("input"));
-      while (said.textContent === before) await new Promise((done) => setTimeout(done, 2));
-      return (performance.now() - start) / 1000;
-    }"""
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
     def note(name: str, tools: Any, act: Any) -> None:

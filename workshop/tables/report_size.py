@@ -129,11 +129,11 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
                 note(name, tools, show)
                 page.wait_for_timeout(1000)  # nobody types before
                 for text in FILTERS if name == CATALOGUE else ():
-                    note(
-                        "catalogue, an answer of its filter",
-                        tools,
-                        lambda page=page, text=text: page.evaluate(ANSWER, text),
-                    )
+
+                    def ask(page: Any = page, text: str = text) -> None:
+                        page.evaluate(ANSWER, text)
+
+                    note("catalogue, an answer of its filter", tools, ask)
                 page.close()
         browser.close()
     return {name: (min(t for t, _ in own), min(c for _, c in own)) for name, own in found.items()}

@@ -3,8 +3,8 @@
     python -m workshop.tables.walks [--results walks]
 
 A solver of one's own, to a figure for a paper: docs/tutorial-solver.md up to the figure. A robot in
-MJCF, to its solutions: docs/tutorial-robot.md up to them. A simulator in C++, to the check of what it
-wrote: examples/cpp/stack.cpp. Each file is saved and each command run as the page has it; what a
+MJCF, to its solutions: docs/tutorial-robot.md up to them. A simulator in C++, to the check of what
+it wrote: examples/cpp/stack.cpp. Each file is saved and each command run as the page has it; what a
 person reads and types is not in the time. FCLIB and its C library are installed before.
 """
 

@@ -913,7 +913,7 @@ def caption(
         return f"{known[0]:g}" if len(known) == 1 else f"{known[0]:g} to {known[-1]:g}"
 
     def first_word(name: str) -> str:
-        return str(next((word for word in in_order(words_in(runs, name)) if word), "?"))
+        return str(next((word for word in in_order(words_in(runs, name)) if word), ""))
 
     runs = table_of(rows)
     failed = int(np.isinf(costs.values).sum())
@@ -924,9 +924,8 @@ def caption(
     days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in ends})
     # version of the core only; modules and programs have their own digests
     own = runs.where(words_in(runs, "origin") == "fclib")
-    versions = sorted(
-        {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
-    )
+    named = {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
+    versions = sorted(named - {""})
     families = len({one.family for one in costs.instances})
     words = [
         f"{counted(len(costs.instances), 'instance')} of {counted(families, 'family', 'families')}",
@@ -950,7 +949,8 @@ def caption(
         words.append(
             f"{counted(costs.of_other_forms, 'run')} of the other form of a problem left out"
         )
-    words += [f"{first_word('cpu')} ({first_word('node')})"]
+    cpu, node = first_word("cpu"), first_word("node")
+    words += [f"{cpu} ({node})" if cpu and node else cpu or node] if cpu or node else []
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
     return "; ".join(words)

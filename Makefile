@@ -32,7 +32,8 @@ help:
 	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
 	@echo "make test-long  the tests of a minute or more, which make test leaves out"
 	@echo "make wasm    the core as a module for browsers, into $(BUILD)/wasm/fclib (needs Emscripten)"
-	@echo "make docs    set up, then build the documentation into $(BUILD)/site (REPORT=ADDRESS: links to a report)"
+	@echo "make docs    set up, then build the documentation into $(BUILD)/site (REPORT=ADDRESS: links to a report;"
+	@echo "             VERSIONS=1.0.0,1.1.0: links to the sites of these versions, in folders beside it)"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make asan    the C++ tests under the sanitizers of addresses and of undefined behaviour"
 	@echo "make tsan    the C++ tests under the sanitizer of threads"
@@ -82,7 +83,7 @@ wasm:
 	  awk '{ printf "build/wasm/fclib: fclib-core.wasm has %.2f MB, compressed\n", $$1 / 1e6 }'
 
 docs: setup $(VENV)/.docs-tools
-	$(BIN)/python scripts/site/build.py $(BUILD)/site $(if $(REPORT),--report $(REPORT))
+	$(BIN)/python scripts/site/build.py $(BUILD)/site $(if $(REPORT),--report $(REPORT)) $(if $(VERSIONS),--versions $(VERSIONS))
 
 fuzz:
 	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)

@@ -1,10 +1,11 @@
-"""Build the documentation: build.py OUT [--quick] [--report ADDRESS], a site that opens from a
-folder and any host.
+"""Build the documentation: build.py OUT [--quick] [--report ADDRESS] [--versions NAME,...], a site
+that opens from a folder and any host.
 
 Its sources are README.md, ARCHITECTURE.md and their like, docs/, and pages that follow from the
 code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
 --quick draws no scene and runs no example. --report says where a site of `fclib report` is served:
-the pages of families and solvers then link to theirs in it.
+the pages of families and solvers then link to theirs in it. --versions names the folders beside OUT
+that have the sites of other versions: each page then links to them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import commands
 import examples
 import families
 import python_api
+import ranking
 import results
 import solvers
 from sphinx.cmd.build import main as sphinx
@@ -35,6 +37,7 @@ AS_THEY_ARE = {
     "SECURITY.md": "security.md",
     "CHANGELOG.md": "changelog.md",
 }
+SCORER = "scorer.js"
 MODULE = ROOT / "build" / "wasm" / "fclib"
 MODULE_FILES = ("fclib.js", "fclib-core.mjs", "fclib-core.wasm")
 # the menu; FOLDER/* stands for the generated pages of a folder
@@ -93,6 +96,7 @@ article table { font-size: 0.85em; }
 article table img { max-width: none; }
 article td:first-child code { white-space: nowrap; }
 article .align-right { margin: 0 0 1em 1.5em; }
+.versions { padding: 0 var(--sidebar-item-spacing-horizontal); font-size: 0.85em; }
 .contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
 .contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }
 .contact-pictures svg[tabindex] { cursor: grab; }
@@ -147,6 +151,7 @@ def gather(folder: Path, quick: bool, report: str) -> None:
         else:
             path.write_text(content, encoding="utf-8")
     tables = results.Results(folder / "results")
+    texts = []
     for path in sorted(folder.rglob("*.md")):
         name = path.relative_to(folder).as_posix()
         text = path.read_text(encoding="utf-8")
@@ -161,6 +166,8 @@ def gather(folder: Path, quick: bool, report: str) -> None:
             below = sorted(p.stem for p in path.parent.glob("*.md") if p != path)
             text += toctree(below)
         path.write_text(text, encoding="utf-8")
+        texts.append((name.removesuffix(".md"), text))
+    (folder / SCORER).write_text(ranking.script(texts), encoding="utf-8")
 
 
 def toctree(entries: list[str], title: str = "") -> str:
@@ -187,7 +194,7 @@ def with_links(text: str, up: str) -> str:
     return text
 
 
-def main(out: Path, quick: bool, report: str) -> int:
+def main(out: Path, quick: bool, report: str, versions: str) -> int:
     """Build in the place of what an earlier build left; the exit status of Sphinx."""
     if (out / ".buildinfo").is_file():
         shutil.rmtree(out)
@@ -198,6 +205,8 @@ def main(out: Path, quick: bool, report: str) -> int:
         gather(sources, quick, report)
         options = ["-b", "html", "-W", "--keep-going", "-q", "-E", "-d", f"{folder}/doctrees"]
         options += ["-c", str(HERE), "-D", f"html_static_path={sources / '_static'}"]
+        options += ["-A", f"versions={versions}"]
+        options += ["-D", f"html_search_scorer={sources / SCORER}"]
         status = sphinx([*options, str(sources), str(out)])
     if status == 0:
         print(f"{out}/index.html")
@@ -209,7 +218,8 @@ if __name__ == "__main__":
     parser.add_argument("out", type=Path)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--report", default="", metavar="ADDRESS")
+    parser.add_argument("--versions", default="", metavar="NAME,...")
     chosen = parser.parse_args()
     if chosen.report and "://" not in chosen.report:
         parser.error(f"--report {chosen.report}: is no address, such as https://host/report")
-    sys.exit(main(chosen.out, chosen.quick, chosen.report.rstrip("/")))
+    sys.exit(main(chosen.out, chosen.quick, chosen.report.rstrip("/"), chosen.versions))

@@ -24,7 +24,15 @@ myst_heading_anchors = 3
 highlight_language = "none"
 
 html_theme = "furo"
-html_title = "FCLIB"
+html_title = f"FCLIB {version}"
+templates_path = [str(Path(__file__).with_name("templates"))]
+# furo's own, and the other versions of the site above them
+html_sidebars = {
+    "**": [
+        *("sidebar/brand.html", "sidebar/search.html", "versions.html"),
+        *("sidebar/scroll-start.html", "sidebar/navigation.html", "sidebar/scroll-end.html"),
+    ]
+}
 html_theme_options = {"sidebar_hide_name": False}
 html_math_renderer = "mathml"
 html_copy_source = False

@@ -26,7 +26,8 @@ def pages(root: Path, runs: bool) -> Iterator[tuple[str, str | bytes]]:
             output, pictures = run(script, Path(folder)) if runs else ("", [])
             for picture in pictures:
                 yield f"examples/{script.stem}-{picture.name}", picture.read_bytes()
-            rows.append((script.stem, title))
+            shown = "".join(f"![{p.stem}]({script.stem}-{p.name})" for p in pictures[:1])
+            rows.append((script.stem, title, shown))
             yield f"examples/{script.stem}.md", page(script, title, rest, output, pictures)
     lines = [
         "# Examples",
@@ -35,8 +36,10 @@ def pages(root: Path, runs: bool) -> Iterator[tuple[str, str | bytes]]:
     ]
     lines[-1] += "was made; times are of that machine. Those in C, C++ and Fortran are on "
     lines[-1] += "[a page of their own](../compiled.md)."
-    lines += ["", "| script | |", "|---|---|"]
-    lines += [f"| [{stem}.py]({stem}.md) | {title} |" for stem, title in rows]
+    # pictures first
+    lines += ["", "| script | | |", "|---|---|---|"]
+    for stem, title, shown in sorted(rows, key=lambda row: not row[2]):
+        lines.append(f"| [{stem}.py]({stem}.md) | {title} | {shown} |")
     yield "examples/index.md", "\n".join(lines) + "\n"
 
 

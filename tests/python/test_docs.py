@@ -28,6 +28,7 @@ pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.slow
 
 REPORT = "https://example.org/report"
+OPTIONS = ["--quick", "--report", REPORT, "--versions", f"0.9.0,{fclib.__version__}"]
 PHONE = {"width": 390, "height": 800}
 
 
@@ -39,8 +40,11 @@ def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     """
     # a folder whose name must be escaped in an address
     folder = tmp_path_factory.mktemp("built") / "a site #1"
+    other = folder.parent / "0.9.0" / "index.html"  # of an earlier version, beside it
+    other.parent.mkdir()
+    other.touch()
     done = subprocess.run(
-        [sys.executable, root / "scripts/site/build.py", folder, "--quick", "--report", REPORT],
+        [sys.executable, root / "scripts/site/build.py", folder, *OPTIONS],
         capture_output=True,
         text=True,
     )
@@ -122,6 +126,13 @@ def test_the_menu_marks_the_way_to_the_page(site: Path, page: str, levels: str) 
         assert ("current-page" in rest, link.startswith("current")) == (last, last)
     # a part of the menu is open where the page is one of it
     assert menu.count('checked=""') == sum("has-children" in rest for _, rest, _ in marked)
+
+
+def test_each_page_leads_to_other_versions(site: Path) -> None:
+    for page, up in (("bench", ".."), ("families/Arch", "../..")):
+        text = (site / f"{page}.html").read_text()
+        assert f'<a href="{up}/0.9.0/index.html">0.9.0</a>' in text
+        assert f"<b>{fclib.__version__}</b>" in text
 
 
 def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:
@@ -284,12 +295,25 @@ class Quiet(SimpleHTTPRequestHandler):
         pass
 
 
-def test_the_search_finds_and_formulas_are_drawn(site: Path, browser: Any) -> None:
+FIRST = {
+    "restitution": "glossary.html",
+    "Delassus matrix": "glossary.html",
+    "slurm": "bench.html",
+    "hyperplane": "solvers/variational-inequality.html#solver-hyperplane",
+}
+# Sphinx shows results one after another, and says how many when all are there
+FOUND = """/found [1-9]/.test(document.querySelector(".search-summary")?.textContent)"""
+
+
+def test_the_search_ranks_and_formulas_are_drawn(site: Path, browser: Any) -> None:
     page = browser.new_page()
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
     page.goto((site / "mathematics.html").as_uri())
     formula = page.locator("div.math math").first
     assert formula.bounding_box()["width"] > 50
-    page.goto((site / "search.html").as_uri() + "?q=hyperplane")
-    page.wait_for_selector("ul.search li a")
-    assert page.locator("ul.search li").count() > 0
+    # the page that defines a word is first, then the page that uses it most
+    for words, first in FIRST.items():
+        page.goto((site / "search.html").as_uri() + f"?q={words}")
+        page.wait_for_function(FOUND)
+        assert page.locator("ul.search li a").first.get_attribute("href").startswith(first), words
     page.close()

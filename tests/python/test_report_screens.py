@@ -14,6 +14,7 @@ import pytest
 
 import fclib
 from fclib.bench import Job, Limits, Record, SolverChoice, Store
+from fclib.bench.profiles import caption as caption_of
 from fclib.collections.figures import bins_of, is_whole
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers_browser import chromium
@@ -288,6 +289,54 @@ def test_the_overview_lists_no_families(browser: Any, site: Path) -> None:
     for name in ("All problems", "all families", "all solvers", "what is open"):
         assert page.get_by_role("link", name=name, exact=True).is_visible()
     page.close()
+
+
+# ---- a figure for a paper
+
+HEAR = """new MutationObserver((seen) => seen.forEach((one) => one.addedNodes.forEach((node) => {
+  if (node.srcdoc) window.sheet = node.srcdoc;
+}))).observe(document.body, { childList: true })"""
+
+
+def test_a_figure_for_a_paper_is_of_what_is_chosen(
+    browser: Any, site: Path, collection: Path, tmp_path: Path
+) -> None:
+    page = open_page(browser, site, "#/profiles?tol=1&solvers=auto~nsgs", viewport=DESK)
+    page.locator("main .plot[data-drawn]").first.wait_for()
+    page.get_by_text("A figure for a paper").click()
+    page.get_by_label("width").select_option("2")
+    texts = {}
+    for kind in ("SVG", "PGF"):
+        with page.expect_download() as saved:
+            page.get_by_role("button", name=f"The figure as {kind}").click()
+        texts[kind] = Path(saved.value.path()).read_text()
+    caption = page.locator(".paper code").first.inner_text()
+    page.evaluate(HEAR)
+    page.get_by_role("button", name="The figure as PDF").click()
+    page.set_content(page.wait_for_function("window.sheet").json_value())
+    pdf = page.pdf(prefer_css_page_size=True)
+    page.close()
+    # two columns are 174 mm; the printed page is the figure
+    assert re.search(r'<svg [^>]*width="493.23pt"', texts["SVG"])
+    box = re.search(rb"/MediaBox \[0 0 ([\d.]+) [\d.]+\]", pdf)
+    assert box is not None
+    assert float(box[1]) == pytest.approx(493.23, abs=1)
+    assert pdf.count(b"/MediaBox") == 1
+    # auto is drawn through, nsgs is dashed, with other marks
+    for text, dashed in ((texts["SVG"], 'stroke-dasharray="6 2"'), (texts["PGF"], "{6bp}{2bp}")):
+        assert dashed in text
+        assert text.count("polygon") + text.count("pathclose") > 10
+        assert "auto" in text
+    # it says what the command says
+    with Campaigns([site.parent / "runs.sqlite"]) as campaigns:
+        costs = campaigns.every.at(1e-8).shared(["auto", "nsgs"])
+        told = caption_of(costs, campaigns.at(1e-8), "families")
+    for word in ("instances of", "each family", "limit", "runs failed", "Abacus"):
+        (part,) = (one for one in told.split("; ") if word in one)
+        assert part in caption
+    assert r"auto~\cite{fclib-solver-auto}, nsgs~\cite{fclib-solver-nsgs}, set rt444" in caption
+    assert r"\begin{figure*}" in caption
+    assert r"\input{performance-cpu_s-1e-8.pgf}" in caption
 
 
 # ---- copies

@@ -25,6 +25,7 @@ from fclib.collections import catalog, families, read_catalog, sets
 from fclib.report import build_site
 from fclib.report.view import as_json
 from workshop.tables import _results
+from workshop.tables.report_size import ANSWER, busy
 
 REPEATS = 5  # times that each page is opened
 FILTER = "masonry contacts > 50 class = hard"
@@ -50,25 +51,10 @@ def many(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
     return found
 
 
-def busy(tools: Any) -> float:
-    """Seconds that the page's thread has computed."""
-    metrics = tools.send("Performance.getMetrics")["metrics"]
-    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
-
-
 def opened(site: Path) -> dict[str, tuple[float, float]]:
     """Seconds, and of CPU, until a page is there or the filter has answered; the least of all."""
     from playwright.sync_api import sync_playwright
 
-    answer = """async (text) => {
-      const field = document.querySelector("main input[type=search]");
-      const said = document.querySelector("main [role=status]"), before = said.textContent;
-      const start = performance.now();
-      field.value = text;
-      field.dispatchEvent(new Event("input"));
-      while (said.textContent === before) await new Promise((done) => setTimeout(done, 2));
-      return (performance.now() - start) / 1000;
-    }"""
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
     def note(name: str, tools: Any, act: Any) -> None:
@@ -95,7 +81,7 @@ def opened(site: Path) -> dict[str, tuple[float, float]]:
                 note(name, tools, open_page)
                 page.wait_for_timeout(1000)  # nobody types before
                 for text in (FILTER, f"{FILTER} arch") if name == "catalogue" else ():
-                    note("filter", tools, lambda page=page, text=text: page.evaluate(answer, text))
+                    note("filter", tools, lambda page=page, text=text: page.evaluate(ANSWER, text))
                 page.close()
         browser.close()
     return {

@@ -17,6 +17,8 @@ import resource
 import shutil
 import tempfile
 import time
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,19 @@ from fclib.bench import Store
 from fclib.report import Campaigns, build_site
 from workshop.tables import _results
 
+# the data that a page loads
+PARTS = {"overview": ("site", "catalogue", "t0", "t0-cpu_s"), "catalogue": ("site", "catalogue")}
 REPEATS = 5  # times that each page is opened
+CATALOGUE = "catalogue"
+FILTERS = ("contacts > 500", "contacts > 500 and solver-07")
+# types into the filter of a catalogue, and waits for what it says
+ANSWER = """async (text) => {
+  const field = document.querySelector("main input[type=search]");
+  const said = document.querySelector("main [role=status]"), before = said.textContent;
+  field.value = text;
+  field.dispatchEvent(new Event("input"));
+  while (said.textContent === before) await new Promise((done) => setTimeout(done, 2));
+}"""
 
 
 def fill(path: Path, problems: int, solvers: int) -> None:
@@ -74,38 +88,61 @@ def run(draw: random.Random, problem: int, solver: int) -> tuple[Any, ...]:
     )
 
 
+def size(site: Path, *names: str) -> float:
+    """Megabytes of files of data."""
+    return sum((site / "data" / f"{name}.js").stat().st_size for name in names) / 1e6
+
+
 def open_pages(site: Path) -> dict[str, tuple[float, float]]:
     """Seconds, and of CPU, until each page shows what it is about; the least of all."""
     from playwright.sync_api import sync_playwright
 
     marks = {
-        "overview, its table of solvers": ("#/overview", "main table tbody tr"),
+        "overview, which solver to take": ("#/overview", "main .answer a"),
         "overview, its first profile": ("#/overview", "main .plot[data-drawn]"),
-        "catalogue": ("#/catalogue", "main table tbody tr"),
+        CATALOGUE: ("#/catalogue", "main table tbody tr"),
         "a problem": ("#/problem/Family1/00001", "main table tbody tr"),
         "profiles, their table of statuses": ("#/profiles", "main table tbody tr"),
         "profiles, their curves": ("#/profiles", "main .plot[data-drawn]"),
     }
-    found: dict[str, tuple[float, float]] = {}
+    found: dict[str, list[tuple[float, float]]] = defaultdict(list)
+
+    def note(name: str, tools: Any, act: Callable[[], object]) -> None:
+        before = busy(tools)
+        start = time.perf_counter()
+        act()
+        found[name].append((time.perf_counter() - start, busy(tools) - before))
+
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium-headless-shell") or shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for name, (address, mark) in marks.items():
-            times, busy = [], []
-            for _ in range(REPEATS):
+        for _ in range(REPEATS):
+            for name, (address, mark) in marks.items():
                 page = browser.new_page()
                 tools = page.context.new_cdp_session(page)
                 tools.send("Performance.enable", {"timeDomain": "threadTicks"})
-                start = time.perf_counter()
-                page.goto(f"{(site / 'index.html').as_uri()}{address}")
-                page.wait_for_selector(mark, state="attached")
-                times.append(time.perf_counter() - start)
-                metrics = tools.send("Performance.getMetrics")["metrics"]
-                busy.append(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+                def show(page: Any = page, address: str = address, mark: str = mark) -> None:
+                    page.goto(f"{(site / 'index.html').as_uri()}{address}")
+                    page.wait_for_selector(mark, state="attached")
+
+                note(name, tools, show)
+                page.wait_for_timeout(1000)  # nobody types before
+                for text in FILTERS if name == CATALOGUE else ():
+
+                    def ask(page: Any = page, text: str = text) -> None:
+                        page.evaluate(ANSWER, text)
+
+                    note("catalogue, an answer of its filter", tools, ask)
                 page.close()
-            found[name] = min(times), min(busy)
         browser.close()
-    return found
+    return {name: (min(t for t, _ in own), min(c for _, c in own)) for name, own in found.items()}
+
+
+def busy(tools: Any) -> float:
+    """Seconds that the page's thread has computed."""
+    metrics = tools.send("Performance.getMetrics")["metrics"]
+    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
 
 
 def main() -> None:
@@ -129,11 +166,10 @@ def main() -> None:
             "CPU [s]": busy,
             "memory [MB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
             "data [MB]": counts["bytes"] / 1e6,
+            **{f"{name} [MB]": size(site, *files) for name, files in PARTS.items()},
             "files": len(list((site / "data").rglob("*.js"))),
         }
         print(_results.table(list(built), [built]))
-        for name in ("site", "catalogue", "t0", "t0-cpu_s"):
-            print(f"  {name:10}{(site / 'data' / f'{name}.js').stat().st_size / 1e6:.2f} MB")
         try:
             opened = open_pages(site)
         except ImportError:

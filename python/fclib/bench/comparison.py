@@ -166,6 +166,12 @@ def pair_forms(problems: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     return pairs
 
 
+def set_of(path: str | None) -> str | None:
+    """The set of a problem by its file, SET/FAMILY/NUMBER-FORM.hdf5; None for any other file."""
+    own = PurePath(path or "")
+    return own.parts[-3] if FORM.fullmatch(own.stem) and len(own.parts) > 2 else None
+
+
 def keys_of(runs: Table, both_forms: bool = False) -> tuple[Integers, list[Key]]:
     """The number of the instance of each run, and the instances."""
     hashes, same, sequences = (words_in(runs, name) for name in ("hash", "same_as", "sequence"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,10 +16,11 @@ import numpy as np
 from fclib.bench import profiles
 from fclib.bench.comparison import METRICS, Array, Costs, Weigh
 
-# told apart by those who see few colours, too: Okabe & Ito (2008), then other strokes
+# colours that those tell apart who see few (Okabe & Ito 2008); strokes and marks for print in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STROKES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
-MARKERS = "osD^v<>PX*hp"
+MARKERS = "osDPX^v*hp"
+MARKS = 8  # of a curve
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 8,
@@ -39,20 +42,44 @@ STYLE: Any = {
     "savefig.dpi": 300,
 }
 SIZE = (5.6, 3.2)  # [inch]
+WIDTHS = {1: 84, 2: 174}  # [mm] of one and of two columns of a journal, as Springer has them
+KINDS_OF_FONTS = ("sans-serif", "serif", "monospace")
+ESCAPES = str.maketrans(
+    {character: f"\\{character}" for character in "&%$#_{}"}
+    | {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}"}
+)
+TEX = ("lualatex", "xelatex", "pdflatex")  # any of them measures the texts of PGF
 ENDS = 1e4  # largest ratio that is shown
 SHARES = {"instances": "instances", "families": "instances, by family,"}
 
 
 def stroke(number: int) -> dict[str, Any]:
-    """How the curve of a solver is drawn."""
-    colour = COLOURS[number % len(COLOURS)]
-    return {"color": colour, "linestyle": STROKES[number // len(COLOURS) % len(STROKES)]}
+    """How the curve of a solver is drawn; the pages of the site draw it alike."""
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "linestyle": STROKES[number % len(STROKES)],
+        "marker": MARKERS[number % len(MARKERS)],
+        "markersize": 4,
+    }
+
+
+def steps(axes: Any, x: Array, y: Array, number: int, name: str) -> None:
+    """A curve of steps, with a few marks: evenly over the axis, and not above those of others."""
+    even = np.linspace(0.0, 1.0, MARKS) + (number % 4) / (4 * MARKS)
+    places = np.searchsorted(x, x[0] * (x[-1] / x[0]) ** even, side="right") - 1
+    marks = np.unique(places).tolist()
+    axes.step(x, y, where="post", label=label(name), markevery=marks, **stroke(number))
 
 
 def label(text: str) -> str:
     """A name as Matplotlib shows it: it takes $ for mathematics, and hides a leading _."""
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
+
+
+def latex_text(text: str) -> str:
+    """A text as LaTeX prints it."""
+    return text.translate(ESCAPES)
 
 
 def wrapped(caption: str, width: int = 110) -> str:
@@ -68,27 +95,105 @@ def figure(folder: Path, name: str, formats: Sequence[str], caption: str = "") -
 
     The caption stands below, in as many lines as it needs.
     """
+    with opened(STYLE, SIZE, formats) as (drawn, axes):
+        yield axes
+        if caption:
+            drawn.supxlabel(label(wrapped(caption)), fontsize=5.5)
+        folder.mkdir(parents=True, exist_ok=True)
+        for kind in formats:
+            save(drawn, folder / f"{name}.{kind}")
+
+
+@contextmanager
+def of_paper(path: Path, columns: int, font: str, height: float = 0.62) -> Iterator[Any]:
+    """Axes of a figure of one or two columns of a journal, with the legend below; then it is saved.
+
+    Args:
+        path: where it is saved; the ending is the format.
+        columns: 1 or 2.
+        font: the name of a font or of a kind of fonts, such as "serif".
+        height: of the figure without the legend, over the width of one column.
+
+    Raises:
+        ValueError: the format, or the font, is not known here.
+    """
+    width = WIDTHS[columns] / 25.4
+    with opened(STYLE | fonts_of(font), (width, 1.0), [path.suffix[1:]]) as (drawn, axes):
+        yield axes
+        # what weighs the same is in the caption
+        axes.set_ylabel(re.sub(" of .* solved", " solved", axes.get_ylabel()))
+        handles, names = axes.get_legend_handles_labels()
+        if path.suffix == ".pgf":
+            # Matplotlib takes a backslash before $ away, from a text without formulas
+            names = [latex_text(name.replace(r"\$", "$")).replace(r"\$", r"\\$") for name in names]
+        room = 18 * width  # characters of a legend in a line
+        across = max(1, min(len(names), int(room / (7 + max(map(len, names), default=1)))))
+        lines = -(-len(names) // across)
+        drawn.set_size_inches(width, height * WIDTHS[1] / 25.4 + 0.14 * lines)
+        drawn.legend(handles, names, loc="outside lower center", ncols=across, handlelength=2.8)
+        save(drawn, path)
+
+
+def fonts_of(font: str) -> dict[str, Any]:
+    """Settings for a font, or for a kind of fonts. Raises ValueError if there is no such font."""
+    from matplotlib import font_manager
+
+    if font not in KINDS_OF_FONTS:
+        try:
+            font_manager.findfont(font, fallback_to_default=False)
+        except ValueError:
+            raise ValueError(
+                f"there is no font {font!r}; say {', '.join(KINDS_OF_FONTS)}, or the name of one"
+            ) from None
+    return {
+        "font.family": font,
+        "mathtext.fontset": "dejavuserif" if font == "serif" else "dejavusans",
+    }
+
+
+@contextmanager
+def opened(
+    style: Mapping[str, Any], size: tuple[float, float], formats: Sequence[str]
+) -> Iterator[tuple[Any, Any]]:
+    """A figure and its axes, which is closed in the end.
+
+    Raises:
+        ValueError: PGF is asked for, and there is no TeX, which measures its texts.
+    """
     import matplotlib
 
     matplotlib.use("Agg", force=False)
     import matplotlib.pyplot as plt
 
-    with plt.rc_context(STYLE):
-        drawn, axes = plt.subplots(figsize=SIZE, layout="constrained")
+    settings: Any = {**style}
+    if "pgf" in formats:
+        found = next(filter(shutil.which, TEX), None)
+        if found is None:
+            raise ValueError(f"PGF needs one of {', '.join(TEX)}; PDF and SVG need no TeX")
+        settings |= {"pgf.texsystem": found, "pgf.rcfonts": False}
+    with plt.rc_context(settings):
+        drawn, axes = plt.subplots(figsize=size, layout="constrained")
         try:
-            yield axes
-            if caption:
-                drawn.supxlabel(label(wrapped(caption)), fontsize=5.5)
-            folder.mkdir(parents=True, exist_ok=True)
-            for kind in formats:
-                part = folder / f".{name}.part.{kind}"
-                # so that the same data give the same file
-                stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
-                drawn.savefig(part, metadata=stamp)
-                drawn.set_layout_engine("none")  # the layout is fixed: saves two thirds of the time
-                part.replace(folder / f"{name}.{kind}")
+            yield drawn, axes
         finally:
             plt.close(drawn)
+
+
+def save(drawn: Any, path: Path) -> None:
+    """Write a figure, whole or not at all; the same data give the same file."""
+    kind = path.suffix[1:]
+    part = path.with_name(f".{path.stem}.part.{kind}")
+    stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
+    try:
+        drawn.savefig(part, **({"metadata": stamp} if stamp else {}))
+    except Exception as error:
+        if kind != "pgf":
+            raise
+        # a TeX without some of its packages
+        reason = str(error).strip().splitlines()[0]
+        raise ValueError(f"PGF: TeX fails: {reason}; PDF and SVG need no TeX") from None
+    drawn.set_layout_engine("none")  # the layout is fixed: saves two thirds of the time
+    part.replace(path)
 
 
 def _legend(axes: Any) -> None:
@@ -108,7 +213,14 @@ def performance(
     ending: str = "",
     weigh: Weigh = "instances",
 ) -> None:
-    """Dolan & More's profiles, the ratio on a logarithmic axis, with their 95 % bands."""
+    """Dolan & More's profiles with their 95 % bands."""
+    with figure(folder, f"performance-{costs.metric}{ending}", formats, caption) as axes:
+        draw_performance(axes, costs, weigh, banded=True)
+        _legend(axes)
+
+
+def draw_performance(axes: Any, costs: Costs, weigh: Weigh, *, banded: bool) -> None:
+    """Dolan & More's profiles, the ratio on a logarithmic axis."""
     quotients = profiles.ratios(costs.values)
     finite = quotients[np.isfinite(quotients)]
     end = min(ENDS, 1.3 * float(finite.max(initial=2.0)))
@@ -116,21 +228,21 @@ def performance(
     spaced = np.geomspace(1, end, 200)
     weights = costs.weights(weigh)
     curves = profiles.share_within(quotients, taus, weights)
-    grid = profiles.share_within(quotients, spaced, weights)
-    low, high = profiles.bands(costs, quotients, spaced, weigh)
-    with figure(folder, f"performance-{costs.metric}{ending}", formats, caption) as axes:
-        for rank, k in enumerate(_order(costs, grid)):
-            name, style = label(costs.legend(k)), stroke(rank)
-            axes.step(taus, curves[k], where="post", label=name, **style)
+    order = _order(costs, profiles.share_within(quotients, spaced, weights))
+    for rank, k in enumerate(order):
+        steps(axes, taus, curves[k], rank, costs.legend(k))
+    if banded:
+        low, high = profiles.bands(costs, quotients, spaced, weigh)
+        for rank, k in enumerate(order):
+            colour = stroke(rank)["color"]
             axes.fill_between(
-                spaced, low[k], high[k], step="post", alpha=0.1, color=style["color"], linewidth=0
+                spaced, low[k], high[k], step="post", alpha=0.1, color=colour, linewidth=0
             )
-        axes.set_xscale("log")
-        axes.set_xlim(1.0, end)
-        axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(rf"$\tau$: {METRICS[costs.metric][0].split(' [')[0]} over that of the best")
-        axes.set_ylabel(rf"share of {SHARES[weigh]} solved within $\tau$")
-        _legend(axes)
+    axes.set_xscale("log")
+    axes.set_xlim(1.0, end)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel(rf"$\tau$: {METRICS[costs.metric][0].split(' [')[0]} over that of the best")
+    axes.set_ylabel(rf"share of {SHARES[weigh]} solved within $\tau$")
 
 
 def data(
@@ -145,24 +257,29 @@ def data(
 ) -> None:
     """The share solved within a cost, or within a cost per contact."""
     shown = costs.per_contact() if per_contact else costs
-    finite = shown.values[np.isfinite(shown.values)]
-    if not finite.size:
+    if not shown.solved.any():
         return
-    ends = 0.8 * float(finite.min()), 1.2 * float(finite.max())
-    bounds = np.unique(np.concatenate([ends, finite]))
-    weights = shown.weights(weigh)
-    curves = profiles.share_within(shown.values, bounds, weights)
-    grid = profiles.share_within(shown.values, np.geomspace(*ends, 200), weights)
     name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "") + ending
     with figure(folder, name, formats, caption) as axes:
-        for rank, k in enumerate(_order(shown, grid)):
-            axes.step(bounds, curves[k], where="post", label=label(shown.legend(k)), **stroke(rank))
-        axes.set_xscale("log")
-        axes.set_xlim(*ends)
-        axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(METRICS[costs.metric][0] + (" per contact" if per_contact else ""))
-        axes.set_ylabel(f"share of {SHARES[weigh]} solved")
+        draw_data(axes, shown, weigh, " per contact" if per_contact else "")
         _legend(axes)
+
+
+def draw_data(axes: Any, costs: Costs, weigh: Weigh, per: str = "") -> None:
+    """The share solved within a cost, on a logarithmic axis; some instance is solved."""
+    finite = costs.values[costs.solved]
+    ends = 0.8 * float(finite.min()), 1.2 * float(finite.max())
+    bounds = np.unique(np.concatenate([ends, finite]))
+    weights = costs.weights(weigh)
+    curves = profiles.share_within(costs.values, bounds, weights)
+    grid = profiles.share_within(costs.values, np.geomspace(*ends, 200), weights)
+    for rank, k in enumerate(_order(costs, grid)):
+        steps(axes, bounds, curves[k], rank, costs.legend(k))
+    axes.set_xscale("log")
+    axes.set_xlim(*ends)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel(METRICS[costs.metric][0] + per)
+    axes.set_ylabel(f"share of {SHARES[weigh]} solved")
 
 
 def work_precision(
@@ -172,37 +289,40 @@ def work_precision(
     formats: Sequence[str],
     caption: str = "",
 ) -> None:
+    """The mean cost at each tolerance."""
+    with figure(folder, f"work-precision-{metric}", formats, caption) as axes:
+        draw_work_precision(axes, points, metric)
+        _legend(axes)
+
+
+def draw_work_precision(axes: Any, points: Sequence[Mapping[str, Any]], metric: str) -> None:
     """The mean cost at each tolerance; a mark is hollow if not all problems were solved."""
     solvers = list(dict.fromkeys(point["solver"] for point in points))
     least = {s: min(p["mean"] for p in points if p["solver"] == s) for s in solvers}
-    with figure(folder, f"work-precision-{metric}", formats, caption) as axes:
-        for rank, solver in enumerate(sorted(solvers, key=lambda s: least[s])):
-            own = [point for point in points if point["solver"] == solver]
-            style = stroke(rank)
-            marker = MARKERS[rank % len(MARKERS)]
-            x, y = [p["mean"] for p in own], [p["tol"] for p in own]
-            fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
-            counts = ", ".join(dict.fromkeys(f"{p['solved']} of {p['of']}" for p in own))
-            name = label(f"{solver} {counts}")
-            axes.plot(x, y, **style, label=name, marker=marker, markersize=4)
-            axes.scatter(
-                x,
-                y,
-                s=16,
-                c=fills,
-                marker=marker,
-                edgecolors=style["color"],
-                linewidths=0.9,
-                zorder=3,
-            )
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        means = np.log10([point["mean"] for point in points])
-        axes.set_xlim(10.0 ** np.floor(means.min()), 10.0 ** np.ceil(means.max()))
-        axes.invert_yaxis()
-        axes.set_xlabel(f"shifted geometric mean of {METRICS[metric][0]}, failures charged")
-        axes.set_ylabel("tolerance on the relative error")
-        _legend(axes)
+    for rank, solver in enumerate(sorted(solvers, key=lambda s: least[s])):
+        own = [point for point in points if point["solver"] == solver]
+        style = stroke(rank)
+        x, y = [p["mean"] for p in own], [p["tol"] for p in own]
+        fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
+        counts = ", ".join(dict.fromkeys(f"{p['solved']} of {p['of']}" for p in own))
+        axes.plot(x, y, **style, label=label(f"{solver} {counts}"))
+        axes.scatter(
+            x,
+            y,
+            s=16,
+            c=fills,
+            marker=style["marker"],
+            edgecolors=style["color"],
+            linewidths=0.9,
+            zorder=3,
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    means = np.log10([point["mean"] for point in points])
+    axes.set_xlim(10.0 ** np.floor(means.min()), 10.0 ** np.ceil(means.max()))
+    axes.invert_yaxis()
+    axes.set_xlabel(f"shifted geometric mean of {METRICS[metric][0]}, failures charged")
+    axes.set_ylabel("tolerance")
 
 
 def convergence(
@@ -219,8 +339,7 @@ def convergence(
     with figure(folder, f"convergence{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: ends[s])):
             curve = np.where(np.isfinite(curves[solver]), curves[solver], np.nan)
-            name = label(legend.get(solver, solver))
-            axes.step(times, curve, where="post", label=name, **stroke(rank))
+            steps(axes, times, curve, rank, legend.get(solver, solver))
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("CPU time [s]")
@@ -245,9 +364,7 @@ def runtimes(
     curves = {name: profiles.share_within(own[:, None], bounds)[0] for name, own in times.items()}
     with figure(folder, f"runtimes{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: -curves[s].mean())):
-            style = stroke(rank)
-            name = label(legend.get(solver, solver))
-            axes.step(bounds, curves[solver], where="post", label=name, **style)
+            steps(axes, bounds, curves[solver], rank, legend.get(solver, solver))
         axes.set_xscale("log")
         axes.set_xlim(*ends)
         axes.set_ylim(0.0, 1.02)

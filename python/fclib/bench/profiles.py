@@ -56,6 +56,7 @@ from fclib.bench.comparison import (
     one_limit,
     pair_forms,
     runs_of,
+    set_of,
     solved_in,
     table_of,
     words_in,
@@ -111,6 +112,7 @@ def load(
     store: str | Path,
     *,
     campaign: str | None = None,
+    sets: Sequence[str] = (),
     families: Sequence[str] = (),
     solvers: Sequence[str] = (),
     tolerances: Sequence[float] = (),
@@ -124,6 +126,7 @@ def load(
     Args:
         store: file of the store.
         campaign: only its runs.
+        sets: only problems of these, by the folders of their files: SET/FAMILY/NUMBER-FORM.hdf5.
         families: only problems of these.
         solvers: only these, by their labels, in this order.
         tolerances: only these.
@@ -147,6 +150,7 @@ def load(
     runs = _name_machines(runs)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
+        ("set", sets),
         ("family", families),
         ("solver", solvers),
         ("tol", tolerances),
@@ -162,7 +166,7 @@ def load(
                 there = own.present() if isinstance(own, Words) else np.unique(own).tolist()
                 raise ProfileError(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
-                    f" there is: {', '.join(sorted(map(str, there)))}"
+                    f" there is: {', '.join(sorted(str(one or '?') for one in there))}"
                 )
             runs = kept(runs, fits)
     nodes = sorted({name or "?" for name in words_in(runs, "node").present()})
@@ -186,11 +190,12 @@ def load(
 
 
 def read(store: Store, more: Sequence[str] = ()) -> Table:
-    """All runs of a store; `same_as` gives the global form of each local form."""
+    """All runs of a store, with their `set`; `same_as` is the global form of each local form."""
     runs = store.table(more=("path", *more))
     runs = Table({name: runs[name] for name in runs.names if name not in UNREAD})
     if not len(runs):
         return runs
+    runs = runs.with_columns(set=words_in(runs, "path").map(set_of))
     _, first = runs.numbers("hash")
     pairs = pair_forms(iter(runs.where(first)))
     declared = words_in(runs, "same_as")
@@ -908,7 +913,7 @@ def caption(
         return f"{known[0]:g}" if len(known) == 1 else f"{known[0]:g} to {known[-1]:g}"
 
     def first_word(name: str) -> str:
-        return str(next((word for word in in_order(words_in(runs, name)) if word), "?"))
+        return str(next((word for word in in_order(words_in(runs, name)) if word), ""))
 
     runs = table_of(rows)
     failed = int(np.isinf(costs.values).sum())
@@ -919,9 +924,8 @@ def caption(
     days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in ends})
     # version of the core only; modules and programs have their own digests
     own = runs.where(words_in(runs, "origin") == "fclib")
-    versions = sorted(
-        {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
-    )
+    named = {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
+    versions = sorted(named - {""})
     families = len({one.family for one in costs.instances})
     words = [
         f"{counted(len(costs.instances), 'instance')} of {counted(families, 'family', 'families')}",
@@ -945,7 +949,8 @@ def caption(
         words.append(
             f"{counted(costs.of_other_forms, 'run')} of the other form of a problem left out"
         )
-    words += [f"{first_word('cpu')} ({first_word('node')})"]
+    cpu, node = first_word("cpu"), first_word("node")
+    words += [f"{cpu} ({node})" if cpu and node else cpu or node] if cpu or node else []
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
     return "; ".join(words)

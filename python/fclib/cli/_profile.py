@@ -67,9 +67,10 @@ def print_profile(
     *,
     note: str = "",
     metric: str = "cpu_s",
-    solver: Sequence[str] = (),
-    family: Sequence[str] = (),
-    tol: Sequence[float] = (),
+    solvers: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    families: Sequence[str] = (),
+    tolerances: Sequence[float] = (),
     campaign: str | None = None,
     machine: str | None = None,
     merit: MeritKind | None = None,
@@ -86,15 +87,16 @@ def print_profile(
 ) -> None:
     """Print the tables of a store, and draw its pictures if a folder is given."""
     chosen: dict[str, Any] = {
-        "families": family,
-        "solvers": solver,
-        "tolerances": tol,
+        "sets": sets,
+        "families": families,
+        "solvers": solvers,
+        "tolerances": tolerances,
         "machine": machine,
         "merit": merit,
     }
     rows = profiles.load(store, campaign=campaign, start=start, **chosen)
     every = profiles.gather(rows, metric, count_unsuitable, both_forms)
-    costs = comparison.compared(every, solver or None, own_set)
+    costs = comparison.compared(every, solvers or None, own_set)
     compared = comparison.runs_of(rows, costs)
     published = published_means(store) if start == "cold" else {}
     both: Table | None = None

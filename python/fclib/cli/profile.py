@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from fclib.bench import profiles
-from fclib.cli._output import Json, MeritKind, fail
+from fclib.cli._output import Json, MeritKind, fail, out
 from fclib.cli._profile import AsMeasured, With, joined, print_profile
 
 Metric = Enum("Metric", {name: name for name in profiles.METRICS}, type=str)  # type: ignore[misc]
@@ -30,6 +30,15 @@ class Weigh(str, Enum):
     instances = "instances"
 
 
+class Curve(str, Enum):
+    """What a figure for a paper shows."""
+
+    performance = "performance"
+    data = "data"
+    contact = "contact"
+    accuracy = "accuracy"
+
+
 class Forms(str, Enum):
     """For a problem with a global and a local form: the form that a solver takes, or both."""
 
@@ -41,6 +50,9 @@ def command(
     store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
     metric: Annotated[Metric, typer.Option(help="What is compared.")] = CPU_TIME,
     solver: Annotated[list[str] | None, typer.Option(help="Only these, by their labels.")] = None,
+    of_set: Annotated[
+        list[str] | None, typer.Option("--set", help="Only the problems of these sets.")
+    ] = None,
     family: Annotated[list[str] | None, typer.Option(help="Only these families.")] = None,
     tol: Annotated[list[float] | None, typer.Option(help="Only these tolerances.")] = None,
     campaign: Annotated[str | None, typer.Option(help="Only the runs of this campaign.")] = None,
@@ -84,36 +96,65 @@ def command(
     formats: Annotated[
         str, typer.Option("--format", help="Formats of the pictures.")
     ] = "pdf,svg,png",
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            help="One figure for a paper instead (.pdf, .svg, .pgf), with caption and citations."
+        ),
+    ] = None,
+    curve: Annotated[
+        Curve,
+        typer.Option(
+            help="What the figure shows: performance profiles, data profiles, these per contact, or"
+            " the cost of an accuracy."
+        ),
+    ] = Curve.performance,
+    columns: Annotated[
+        int, typer.Option(help="The figure is as wide as one or two columns.", min=1, max=2)
+    ] = 1,
+    font: Annotated[
+        str, typer.Option(help="Font of the figure: serif, sans-serif, or the name of one.")
+    ] = "sans-serif",
     beside: With = None,
     as_measured: AsMeasured = False,
     as_json: Json = False,
 ) -> None:
     """Compare the solvers of a store.
 
-    Prints tables. With --out it draws pictures too.
+    Prints tables. With --out it draws pictures too. With --figure it draws one for a paper.
     """
+    if figure and (out_dir or as_json):
+        raise typer.BadParameter(
+            "--figure makes one figure, and no tables: leave out --out, --json"
+        )
+    chosen: dict[str, Any] = {
+        "sets": of_set or (),
+        "families": family or (),
+        "solvers": solver or (),
+        "tolerances": tol or (),
+        "campaign": campaign,
+        "machine": machine,
+        "merit": merit.value if merit else None,
+        "start": start.value,
+        "metric": metric.value,
+        "penalty": penalty,
+        "shift": shift,
+        "count_unsuitable": count_unsuitable,
+        "own_set": own_set,
+        "both_forms": forms is Forms.both,
+        "weigh": weigh.value,
+    }
     try:
         with joined(store, beside, machine, as_measured) as (whole, note):
+            if figure:
+                from fclib.report import write_figure
+
+                drawn: dict[str, Any] = {"curve": curve.value, "columns": columns, "font": font}
+                for path in write_figure(whole, figure, note=note, **drawn, **chosen):
+                    out.print(str(path), highlight=False)
+                return
             print_profile(
-                whole,
-                out_dir,
-                note=note,
-                metric=metric.value,
-                solver=solver or (),
-                family=family or (),
-                tol=tol or (),
-                campaign=campaign,
-                machine=machine,
-                merit=merit.value if merit else None,
-                start=start.value,
-                penalty=penalty,
-                shift=shift,
-                count_unsuitable=count_unsuitable,
-                own_set=own_set,
-                both_forms=forms is Forms.both,
-                weigh=weigh.value,
-                formats=formats.split(","),
-                as_json=as_json,
+                whole, out_dir, note=note, formats=formats.split(","), as_json=as_json, **chosen
             )
     except ImportError as error:
         fail(f'{error}; pip install "fclib[bench]"')

@@ -18,16 +18,18 @@ browser.py     the module with which its pages check and solve problems
 serving.py     serves a site at an address of this machine
 recipes.py     lines to copy: how to get, read and solve a problem
 citing.py      BibTeX of all that the site shows; references.bib has the papers
-paper.py       figures and tables for a paper
+paper.py       all figures and tables of a campaign for a paper
+figure.py      one figure for a paper, with its caption and citations
 libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError
 assets/        the pages themselves: HTML, CSS, JavaScript; pages/ has a file for each kind of page
 
-site.py needs all others but paper.py; drawings.py needs view.py and picture.py, these two
-solids.py, and view.py network.py; paper.py needs runs.py.
+site.py needs all others but paper.py and figure.py; drawings.py needs view.py and picture.py, these
+two solids.py, and view.py network.py; paper.py needs runs.py, figure.py citing.py.
 """
 
 from fclib.report.error import ReportError
+from fclib.report.figure import write_figure
 from fclib.report.paper import write_paper
 from fclib.report.runs import Campaigns
 from fclib.report.serving import serve
@@ -40,6 +42,7 @@ __all__ = [
     "build_site",
     "serve",
     "view_of",
+    "write_figure",
     "write_paper",
     "write_view",
 ]

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
+from fclib.bench.plots import latex_text
+from fclib.collections.set_index import SETS
 
 REFERENCES = Path(__file__).with_name("references.bib")
 REPORT = """\
@@ -80,6 +82,14 @@ def papers_of(citation: str) -> list[dict[str, str]]:
     return found
 
 
+def of_solver(name: str, title: str, citation: str, origin: str, version: str) -> list[str]:
+    """What to cite of a solver: its papers; itself if it has none or is of another package."""
+    papers = [paper["bibtex"] for paper in papers_of(citation)]
+    if papers and origin == "fclib":
+        return papers
+    return [*papers, implementation(name, title, f"{origin} {version}".strip())]
+
+
 def software() -> str:
     """BibTeX of this software, from CITATION.cff."""
     return SOFTWARE.format(version=_core.version)
@@ -100,6 +110,12 @@ def family(record: Mapping[str, Any]) -> str:
     return entry("family", name, f"{record.get('title') or name}: problems of {name}", note)
 
 
+def set_of_problems(name: str) -> str:
+    """BibTeX of a set, in its present version."""
+    version, words = SETS[name]
+    return entry("set", name, f"{name}: {words}", [f"version {version}", f"FCLIB {_core.version}"])
+
+
 def problem() -> str:
     """BibTeX of a problem, with {id}, {key}, {version} and {digest} to fill in."""
     note = ["version {version}", "fclib.digest {digest}", f"FCLIB {_core.version}"]
@@ -108,9 +124,8 @@ def problem() -> str:
 
 def implementation(name: str, title: str, version: str) -> str:
     """BibTeX of a solver: of its version here, or of its origin."""
-    return entry(
-        "solver", name, f"{title or name}: solver {name}", [version or f"FCLIB {_core.version}"]
-    )
+    note = latex_text(version or f"FCLIB {_core.version}")
+    return entry("solver", name, latex_text(f"{title or name}: solver {name}"), [note])
 
 
 def entry(kind: str, name: str, title: str, note: list[str]) -> str:

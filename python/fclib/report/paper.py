@@ -8,6 +8,7 @@ from typing import Any
 
 from fclib.bench import plots, profiles
 from fclib.bench.comparison import compared
+from fclib.bench.plots import latex_text
 from fclib.report.runs import WEIGH, Campaigns
 
 FORMATS = ("pdf",)
@@ -64,7 +65,7 @@ def latex(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [
         rf"\begin{{tabular}}{{{''.join('r' if right else 'l' for right in numeric)}}}",
         r"\toprule",
-        " & ".join(_escaped(HEADS.get(key, key)) for key in keys) + r" \\",
+        " & ".join(latex_text(HEADS.get(key, key)) for key in keys) + r" \\",
         r"\midrule",
         *(" & ".join(_cell(row[key]) for key in keys) + r" \\" for row in rows),
         r"\bottomrule",
@@ -80,13 +81,7 @@ def _cell(value: Any) -> str:
         text = f"{value:.3g}"
         mantissa, e, exponent = text.partition("e")
         return rf"${mantissa}\cdot 10^{{{int(exponent)}}}$" if e else text
-    return _escaped(str(value))
-
-
-def _escaped(text: str) -> str:
-    for character in "&%$#_{}":
-        text = text.replace(character, f"\\{character}")
-    return text
+    return latex_text(str(value))
 
 
 def _write(path: Path, text: str) -> None:

@@ -35,11 +35,12 @@ from fclib._words import counted
 from fclib.bench import profiles
 from fclib.bench.campaign import described
 from fclib.bench.comparison import COMMON
+from fclib.bench.plots import COLOURS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.bench.table import object_in
 from fclib.collections import families, ratings, read_catalog, sets
 from fclib.collections.figures import MEASURES, bins_of, is_whole
-from fclib.collections.set_index import kind_of
+from fclib.collections.set_index import SETS, kind_of, version
 from fclib.report import browser, citing, downloads, drawings
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
@@ -51,7 +52,16 @@ MARK = "data/site.js"  # file by which a folder is known to be a site
 SCENE = "scene.png"  # picture of a family in a catalogue's folder
 # scripts in the order in which a page loads them, after core.js and DataTables
 SCRIPTS = (
-    *("table.js", "plot.js", "filter.js", "scene.js", "compare.js", "take.js", "live.js"),
+    *(
+        "table.js",
+        "plot.js",
+        "paper.js",
+        "filter.js",
+        "scene.js",
+        "compare.js",
+        "take.js",
+        "live.js",
+    ),
     *("whatif.js", "compute.js", "own.js", "parts.js", "choose.js"),
     *(f"pages/{path.name}" for path in sorted((ASSETS / "pages").glob("*.js"))),
     "site.js",
@@ -446,6 +456,12 @@ class _Writer:
         site["families"] = self._families(steps)
         site["views"] = views
         site["ratings"] = _records_of_classes(self.problems, self.campaigns)
+        named = {row.get(key) for row in self.problems.rows for key in ("collection", "kind")}
+        site["sets"] = {
+            name: {"version": version(name), "bibtex": citing.set_of_problems(name)}
+            for name in sorted(SETS.keys() & named)
+        }
+        site["colours"] = list(COLOURS)
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
         site |= _numbers(self.problems.rows)
         site["recipes"] = recipes(sorted(formulations))
@@ -719,12 +735,13 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     about = object_in(row["about"])
     if not all(isinstance(about.get(key), kind) for key, kind in ABOUT.items()):
         about = {}  # the store was made before solvers had descriptions, or was edited
-    name, title = row["solver_name"], about.get("title", "")
+    name, title, citation = row["solver_name"], about.get("title", ""), about.get("citation", "")
     found: dict[str, Any] = {"label": label, "name": name}
     found |= {key: row[key] for key in ("options", "version", "origin")}
     found["family"] = row["solver_family"]
-    version = f"{found['origin'] or 'fclib'} {found['version'] or _core.version}"
-    found["bibtex"] = citing.implementation(name, title, version)
+    origin, version = found["origin"] or "fclib", found["version"] or _core.version
+    found["bibtex"] = citing.implementation(name, title, f"{origin} {version}")
+    found["cite"] = citing.of_solver(name, title, citation, origin, version)
     found["use"] = _use(name, object_in(row["options"]))
     if not about:
         return found

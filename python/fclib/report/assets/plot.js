@@ -3,12 +3,13 @@
 "use strict";
 (() => {
   const { h, number, colour } = Fclib;
-  const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
+  // curves differ in print without colours; fclib.bench.plots has the same strokes
+  const DASHES = ["solid", "dash", "dot", "dashdot"];
   const BANDED = 6; // curves with a band: more hide each other
   const FEWEST = 1000; // values of x up to which each is drawn
   Fclib.stroke = (k) => ({
     color: colour(`c${k % 7}`),
-    dash: DASHES[Math.floor(k / 7) % DASHES.length],
+    dash: DASHES[k % DASHES.length],
   });
   Fclib.swatch = (k) =>
     h("span", {
@@ -17,7 +18,7 @@
       "data-symbol": "●■◆✚✖▲▼★⬢⬟"[k % 10],
       style:
         `color: var(--c${k % 7}); border-top: 3px ` +
-        `${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]}`,
+        `${["solid", "dashed", "dotted", "double"][k % 4]}`,
     });
   // the buttons of a chart and of a picture in space: these and no others, none that sends data;
   // none for fingers

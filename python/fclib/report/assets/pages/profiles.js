@@ -13,10 +13,18 @@
     familyChoices,
   } = Fclib.parts;
 
+  const SET = "set:"; // before the name of a set
+  const TITLES = {
+    performance: "Performance profiles",
+    data: "Data profiles",
+    contact: "Data profiles of the cost per contact",
+  };
+
   Fclib.pages.profiles = async (page, rest, params, keep) => {
     const s = site();
     const cat = await catalogue();
     const labels = s.solvers.map((v) => v.label);
+    const setChoices = () => Object.keys(s.sets).map((name) => [SET + name, `set ${name}`]);
     const fair = (t) =>
       ((s.headlines[t] || {}).solvers || labels).map((name) => labels.indexOf(name));
     const state = {
@@ -102,7 +110,7 @@
         ),
         select("measure", Object.entries(s.metrics), state.metric, change("metric")),
         select("tolerance", tolerances(), state.tol, change("tol")),
-        select("family", familyChoices(), state.family, change("family")),
+        select("problems", [...setChoices(), ...familyChoices()], state.family, change("family")),
         select(
           "set",
           [
@@ -146,19 +154,24 @@
       pair,
     );
 
+    // a report without a catalogue knows no sets
+    const setOf = (k) =>
+      [cat.read.collection?.(k), cat.read.kind?.(k)].find((name) => s.sets[name]) ?? "";
+    const isMeant = (k) =>
+      !state.family ||
+      state.family === (state.family.startsWith(SET) ? SET + setOf(k) : cat.read.family(k));
     let enough = () => fair(state.tol);
     const draw = async () => {
       const [bench, costs] = await Promise.all([
         load(`t${state.tol}`),
         load(`t${state.tol}-${state.metric}`),
       ]);
-      const keepProblem = state.family ? (k) => cat.read.family(k) === state.family : () => true;
       const order = [...chosen].sort((a, b) => a - b);
       enough = () =>
-        state.family ? Fclib.widest(bench, costs, labels, keepProblem, s.common) : fair(state.tol);
+        state.family ? Fclib.widest(bench, costs, labels, isMeant, s.common) : fair(state.tol);
       const found = Fclib.profile(bench, costs, {
         solvers: order,
-        keep: keepProblem,
+        keep: isMeant,
         own: state.set === "own",
         weigh: state.weigh,
         kind: state.kind,
@@ -166,8 +179,8 @@
         contacts: cat.read.nc,
       });
       drawProfile(order, found, bench);
-      drawStatuses(order, bench, keepProblem);
-      drawPair(bench, costs, keepProblem);
+      drawStatuses(order, bench);
+      drawPair(bench, costs);
     };
     const drawProfile = (order, { instances, values, shown, weights }, bench) => {
       if (!order.length || !instances.length) {
@@ -214,35 +227,82 @@
         ),
       }));
       const metric = s.metrics[state.metric];
+      const axes = {
+        name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`,
+        series,
+        xlog: state.axis === "log",
+        xrange: performance
+          ? [1, state.axis === "log" ? high * 1.1 : high]
+          : [state.axis === "log" ? low * 0.8 : 0, high * 1.1],
+        xlabel: performance
+          ? `τ: ${metric.split(" [")[0]} over that of the best`
+          : metric + (state.kind === "contact" ? " per contact" : ""),
+      };
+      const of =
+        state.set === "own"
+          ? "for each solver those that it has run and takes"
+          : "those that all chosen solvers have run and take";
+      const weight = state.weigh === "families" ? "each family" : "each instance";
+      const problems = state.family.replace(SET, "set ");
       box.replaceChildren(
         Fclib.lines({
-          name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`,
+          ...axes,
           title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`,
-          series,
-          xlog: state.axis === "log",
-          xrange: performance
-            ? [1, state.axis === "log" ? high * 1.1 : high]
-            : [state.axis === "log" ? low * 0.8 : 0, high * 1.1],
           yrange: [0, 1],
           ypercent: true,
           xname: performance ? "τ" : metric,
-          xlabel: performance
-            ? `τ: ${metric.split(" [")[0]} over that of the best`
-            : metric + (state.kind === "contact" ? " per contact" : ""),
           ylabel: performance ? "instances solved within τ" : "instances solved",
           note:
-            `${Fclib.count(instances.length, "instance")} of ${bench.problems.length}: ` +
-            (state.set === "own"
-              ? "for each solver those that it has run and takes"
-              : "those that all chosen solvers have run and take") +
-            `; ${state.weigh === "families" ? "each family" : "each instance"} weighs the ` +
-            `same; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
+            `${Fclib.count(instances.length, "instance")} of ${bench.problems.length}: ${of}` +
+            `; ${weight} weighs the same; ${s.judged}` +
+            `${problems && `, ${state.family.startsWith(SET) ? "" : "family "}${problems}`}.`,
         }),
+        Fclib.paper(
+          {
+            ...axes,
+            colours: s.colours,
+            ylabel: performance ? "share solved within τ" : "share solved",
+          },
+          caption(order, instances, values, bench, [of, `${weight} weighs the same`]),
+        ),
       );
     };
-    const drawStatuses = (order, bench, keepProblem) => {
+    /* what a figure of these is of, and what it cites */
+    const caption = (order, instances, values, bench, words) => {
+      const rows = instances.map((i) => bench.problems[i]);
+      const limits = instances.map((i) => bench.limits[i]);
+      const ends = [Math.min(...limits), Math.max(...limits)];
+      const failed = values.flat().filter((v) => v === Infinity).length;
+      const had = values.flat().filter((v) => !Number.isNaN(v)).length;
+      const solvers = order.map((k) => s.solvers[k]);
+      const sets = [...new Set(rows.map(setOf))].filter(Boolean).sort();
+      const families = new Set(rows.map((k) => cat.read.family(k)));
+      return {
+        title: TITLES[state.kind],
+        words: [
+          `${Fclib.count(instances.length, "instance")} of ` +
+            Fclib.count(families.size, "family", "families"),
+          ...words,
+          `tolerance ${Fclib.tolerance(s.tolerances[state.tol])}`,
+          `limit ${[...new Set(ends)].map((v) => Fclib.number(v)).join(" to ")} s of CPU`,
+          `${failed} of ${Fclib.count(had, "run")} failed`,
+          s.judged,
+          s.overview.cpu && `${s.overview.cpu} (${s.overview.node})`,
+          `FCLIB ${s.version}`,
+        ],
+        cites: [
+          ...solvers.map((one) => [one.label, one.cite]),
+          ...sets.map((name) => [
+            `set ${name}, version ${s.sets[name].version}`,
+            [s.sets[name].bibtex],
+          ]),
+          ["FCLIB", s.cite.collection.split("\n\n")],
+        ],
+      };
+    };
+    const drawStatuses = (order, bench) => {
       const rows = order.map((k) => {
-        const counts = Fclib.ended(bench, k, keepProblem);
+        const counts = Fclib.ended(bench, k, isMeant);
         const total = Object.values(counts).reduce((a, b) => a + b, 0);
         return { solver: labels[k], total, counts };
       });
@@ -276,7 +336,7 @@
       const first = order.includes("auto") ? "auto" : order[0];
       return [first, order.find((name) => name !== first) ?? first];
     };
-    const drawPair = (bench, costs, keepProblem) => {
+    const drawPair = (bench, costs) => {
       const names = labels.map((name) => [name, name]);
       const [first_, second_] = rivals(state.tol, labels);
       const a = Math.max(0, labels.indexOf(state.a ?? first_));
@@ -291,7 +351,7 @@
         const x = costs[a][i];
         const y = costs[b][i];
         const absent = [a, b].some((one) => bench.absent.includes(bench.statuses[one][i]));
-        if (!keepProblem(k) || absent || (x === null && y === null)) return;
+        if (!isMeant(k) || absent || (x === null && y === null)) return;
         for (const v of [x, y])
           if (v !== null) {
             low = Math.min(low, v);

@@ -40,11 +40,11 @@ TEST(Factorization, bodies_whose_mass_is_not_symmetric_stay_apart) {
   }
   SparseColumns a(6, 6);
   a.setFromTriplets(entries.begin(), entries.end());
-  SparseColumns b(6, 3);
+  SparseColumns b(6, 4);
   b.insert(3, 0) = 2;
   b.insert(0, 1) = -1;
-  b.insert(4, 1) = 3;
   b.insert(5, 2) = 1;
+  b.insert(4, 3) = 3;
   const Factorization factorization(a, "A");
   const Eigen::MatrixXd expected = Eigen::MatrixXd(a).inverse() * Eigen::MatrixXd(b);
   const SparseColumns x = factorization.solve(b);

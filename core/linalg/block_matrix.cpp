@@ -1,8 +1,8 @@
 #include "linalg/block_matrix.hpp"
 
 #include <algorithm>
-#include <numeric>
 
+#include "linalg/groups.hpp"
 #include "linalg/with_dimension.hpp"
 
 namespace fclib {
@@ -134,28 +134,13 @@ void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y,
 }
 
 std::vector<Index> BlockMatrix::components() const {
-  std::vector<Index> group(static_cast<std::size_t>(nc_), dense_ ? 0 : -1);
-  if (dense_) return group;
-  // the pattern may be unsymmetric: union-find over all blocks
-  std::vector<Index> parent(static_cast<std::size_t>(nc_));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](Index node) {
-    while (parent[node] != node) node = parent[node] = parent[parent[node]];
-    return node;
-  };
+  if (dense_) return std::vector<Index>(static_cast<std::size_t>(nc_), 0);
+  // the pattern may be unsymmetric: all blocks link
+  Groups groups(nc_);
   for (Index col = 0; col < nc_; ++col) {
-    for (std::size_t k = column_[col]; k < column_[col + 1]; ++k) {
-      const Index a = root(row_[k]);
-      const Index b = root(col);
-      if (a != b) parent[std::max(a, b)] = std::min(a, b);
-    }
+    for (std::size_t k = column_[col]; k < column_[col + 1]; ++k) groups.link(row_[k], col);
   }
-  Index count = 0;
-  for (Index contact = 0; contact < nc_; ++contact) {
-    const Index top = root(contact);
-    group[contact] = top == contact ? count++ : group[top];
-  }
-  return group;
+  return groups.numbers();
 }
 
 BlockMatrix BlockMatrix::restricted(const std::vector<Index>& contacts) const {

@@ -1,5 +1,6 @@
 #include "linalg/factorization.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "error.hpp"
+#include "linalg/groups.hpp"
 
 namespace fclib {
 
@@ -22,6 +24,9 @@ constexpr Eigen::Index large = 1000;
 constexpr Eigen::Index mesh_entries = 20;
 /// ... and they are used if an LU factorisation would take at least so many multiplications.
 constexpr double supernodal_flops = 1e8;
+
+/// Dense blocks are factorised if at least this share of their entries is there.
+constexpr double dense_share = 0.5;
 
 /// The clock is read after so many columns of a product.
 constexpr Index columns_at_once = 64;
@@ -195,6 +200,103 @@ struct Factorization::Cholesky
 };
 struct Factorization::LU : Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>> {};
 
+/// LU factors of a matrix that falls into dense blocks: P_k A_k = L_k U_k of the rows of block k.
+class Factorization::Blocks {
+ public:
+  /// Finds the blocks. They are factorised only if dense().
+  explicit Blocks(const SparseColumns& a) {
+    Groups groups(static_cast<Index>(a.rows()));
+    double entries = 0;
+    for (Index col = 0; col < static_cast<Index>(a.cols()); ++col) {
+      for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+        if (entry.value() == 0) continue;
+        ++entries;
+        groups.link(static_cast<Index>(entry.row()), col);
+      }
+    }
+    block_ = groups.numbers();
+    for (Index row = 0; row < static_cast<Index>(block_.size()); ++row) {
+      rows_.resize(std::max(rows_.size(), static_cast<std::size_t>(block_[row]) + 1));
+      auto& rows = rows_[block_[row]];
+      place_.push_back(static_cast<Index>(rows.size()));
+      rows.push_back(row);
+    }
+    double size = 0;
+    for (const auto& rows : rows_) size += std::pow(static_cast<double>(rows.size()), 2);
+    dense_ = entries >= dense_share * size;
+  }
+
+  [[nodiscard]] bool dense() const { return dense_; }
+
+  /// Returns false if the matrix is singular.
+  [[nodiscard]] bool factorise(const SparseColumns& a) {
+    for (const auto& rows : rows_) {
+      Dense block = Dense::Zero(size_of(rows), size_of(rows));
+      for (const Index col : rows) {
+        for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+          if (entry.value() != 0) block(place_[entry.row()], place_[col]) += entry.value();
+        }
+      }
+      factors_.emplace_back(block);
+      if ((factors_.back().matrixLU().diagonal().array() == 0).any()) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] Vector solve(ConstVectorRef b) const {
+    Vector x(b.size());
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      x(rows_[k]) = Vector(factors_[k].solve(Vector(b(rows_[k]))));
+    }
+    return x;
+  }
+
+  /// A^-1 B. A column costs what the blocks cost that it touches.
+  [[nodiscard]] SparseColumns solve(const SparseColumns& b) const {
+    SparseColumns result(b.rows(), b.cols());
+    result.reserve(b.nonZeros());
+    std::vector<std::pair<Index, double>> entries;
+    std::vector<Index> touched;
+    for (Index col = 0; col < static_cast<Index>(b.cols()); ++col) {
+      touched.clear();
+      entries.clear();
+      for (SparseColumns::InnerIterator entry(b, col); entry; ++entry) {
+        touched.push_back(block_[entry.row()]);
+      }
+      std::sort(touched.begin(), touched.end());
+      touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+      for (const Index block : touched) {
+        const auto& rows = rows_[block];
+        Vector part = Vector::Zero(size_of(rows));
+        for (SparseColumns::InnerIterator entry(b, col); entry; ++entry) {
+          if (block_[entry.row()] == block) part[place_[entry.row()]] = entry.value();
+        }
+        part = Vector(factors_[block].solve(part));
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+          entries.emplace_back(rows[k], part[static_cast<Eigen::Index>(k)]);
+        }
+      }
+      std::sort(entries.begin(), entries.end());
+      result.startVec(col);
+      for (const auto& [row, value] : entries) result.insertBack(row, col) = value;
+    }
+    result.finalize();
+    return result;
+  }
+
+ private:
+  using Dense = Eigen::MatrixXd;
+
+  static Eigen::Index size_of(const std::vector<Index>& rows) {
+    return static_cast<Eigen::Index>(rows.size());
+  }
+
+  std::vector<std::vector<Index>> rows_;  // of each block
+  std::vector<Index> block_, place_;      // of each row: its block, and where it is in it
+  std::vector<Eigen::PartialPivLU<Dense>> factors_;
+  bool dense_ = false;
+};
+
 Factorization::Factorization(Factorization&&) noexcept = default;
 Factorization& Factorization::operator=(Factorization&&) noexcept = default;
 Factorization::~Factorization() = default;
@@ -221,16 +323,23 @@ Factorization::Factorization(const SparseColumns& a, const std::string& name, bo
     }
     return;
   }
-  lu_ = std::make_unique<LU>();
-  lu_->compute(a);
-  if (lu_->info() != Eigen::Success) {
-    throw Error(ErrorKind::unsuitable, name + " is singular");
+  blocks_ = std::make_unique<Blocks>(a);
+  bool regular = true;
+  if (blocks_->dense()) {
+    regular = blocks_->factorise(a);
+  } else {
+    blocks_.reset();
+    lu_ = std::make_unique<LU>();
+    lu_->compute(a);
+    regular = lu_->info() == Eigen::Success;
   }
+  if (!regular) throw Error(ErrorKind::unsuitable, name + " is singular");
 }
 
 Vector Factorization::solve(ConstVectorRef b) const {
   if (supernodal_) return supernodal_->solve(b);
   if (cholesky_) return cholesky_->solve(b);
+  if (blocks_) return blocks_->solve(b);
   if (lu_) return lu_->solve(b);
   return b;
 }
@@ -262,6 +371,7 @@ SparseColumns Factorization::solve(const SparseColumns& b) const {
     return result;
   }
   if (cholesky_) return cholesky_->solve(b);
+  if (blocks_) return blocks_->solve(b);
   if (lu_) return lu_->solve(b);
   return b;
 }
@@ -271,7 +381,7 @@ SparseColumns Factorization::gram(const SparseColumns& b) const { return *gram(b
 std::optional<SparseColumns> Factorization::gram(const SparseColumns& b,
                                                  const Deadline& deadline) const {
   if (supernodal_) return supernodal_->gram(b, deadline);
-  if (lu_) return product(SparseColumns(b.transpose()), solve(b), deadline);
+  if (lu_ || blocks_) return product(SparseColumns(b.transpose()), solve(b), deadline);
   const std::optional<SparseColumns> half = half_solve(b, deadline);
   if (!half) return std::nullopt;
   return square(*half, deadline);
@@ -279,10 +389,11 @@ std::optional<SparseColumns> Factorization::gram(const SparseColumns& b,
 
 Vector Factorization::gram_diagonal(const SparseColumns& b) const {
   if (supernodal_) return supernodal_->gram_diagonal(b);
-  const SparseColumns x = lu_ ? lu_->solve(b) : *half_solve(b, never);
+  const bool whole = lu_ || blocks_;
+  const SparseColumns x = whole ? solve(b) : *half_solve(b, never);
   Vector result(b.cols());
   for (Eigen::Index col = 0; col < b.cols(); ++col) {
-    result[col] = lu_ ? b.col(col).dot(x.col(col)) : x.col(col).squaredNorm();
+    result[col] = whole ? b.col(col).dot(x.col(col)) : x.col(col).squaredNorm();
   }
   return result;
 }

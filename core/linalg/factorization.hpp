@@ -12,7 +12,7 @@
 namespace fclib {
 
 /// A sparse factorisation: Cholesky if the matrix is symmetric (by supernodes if that is faster),
-/// else LU.
+/// else LU, by dense blocks if the matrix has such blocks.
 ///
 /// Files hold mass matrices that are not quite symmetric because of rounding or a linearisation
 /// (1e-7 relative in CubeH8). Half of such a matrix would be another problem.
@@ -49,6 +49,7 @@ class Factorization {
   // Eigen's; only the .cpp file sees it
   struct Cholesky;
   struct LU;
+  class Blocks;
 
   /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y, from the simplicial factors. The cost is that of the
   /// non-zeros it makes, not n times the columns: bodies that do not touch stay separate.
@@ -57,6 +58,7 @@ class Factorization {
 
   std::unique_ptr<Cholesky> cholesky_;                // for bodies, each with its own small block
   std::unique_ptr<MultifrontalCholesky> supernodal_;  // for meshes
+  std::unique_ptr<Blocks> blocks_;                    // for bodies, if A is not symmetric
   std::unique_ptr<LU> lu_;
 };
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 
+#include "linalg/groups.hpp"
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
 #include "reduced/gauss_seidel.hpp"
@@ -52,16 +52,10 @@ constexpr std::int64_t long_limit = 40;  // factorisations
 /// nothing.
 std::vector<Index> bodies(const Primal& primal, int d) {
   const auto count = static_cast<std::size_t>(primal.M.rows());
-  std::vector<Index> parent(count);
-  std::iota(parent.begin(), parent.end(), Index{0});
-  const auto root = [&](Index k) {
-    while (parent[k] != k) k = parent[k] = parent[parent[k]];
-    return k;
-  };
-  const auto link = [&](Index a, Index b) { parent[root(a)] = root(b); };
+  Groups groups(static_cast<Index>(count));
   for (Index column = 0; column < primal.M.cols(); ++column) {
     for (SparseColumns::InnerIterator entry(primal.M, column); entry; ++entry) {
-      if (entry.value() != 0) link(static_cast<Index>(entry.row()), column);
+      if (entry.value() != 0) groups.link(static_cast<Index>(entry.row()), column);
     }
   }
   std::vector<std::vector<Index>> felt(count);  // contacts, ascending
@@ -79,12 +73,10 @@ std::vector<Index> bodies(const Primal& primal, int d) {
   };
   for (Index k = 0; k < static_cast<Index>(count); ++k) {
     for (Index near = std::max<Index>(0, k - reach); near < k; ++near) {
-      if (within(felt[k], felt[near]) || within(felt[near], felt[k])) link(k, near);
+      if (within(felt[k], felt[near]) || within(felt[near], felt[k])) groups.link(k, near);
     }
   }
-  std::vector<Index> body(count);
-  for (Index k = 0; k < static_cast<Index>(count); ++k) body[k] = root(k);
-  return body;
+  return groups.numbers();
 }
 
 /// Some coordinates and some contacts. `place` has the new number of each coordinate; -1: left out.

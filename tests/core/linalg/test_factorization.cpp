@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "error.hpp"
 #include "random_data.hpp"
@@ -24,6 +25,36 @@ TEST(Factorization, solves_symmetric_and_other_systems) {
     EXPECT_LT((Eigen::MatrixXd(a * factorization.solve(many)) - Eigen::MatrixXd(many)).norm(),
               1e-12);
   }
+}
+
+TEST(Factorization, bodies_whose_mass_is_not_symmetric_stay_apart) {
+  testing::RandomData random(8);
+  // blocks of 1, 3 and 2 rows among one another, a stored zero between two of them
+  const std::vector<std::vector<Index>> bodies{{0}, {1, 3, 5}, {2, 4}};
+  std::vector<Eigen::Triplet<double, Index>> entries{{0, 4, 0.0}};
+  for (const auto& rows : bodies) {
+    for (const Index row : rows) {
+      for (const Index col : rows)
+        entries.emplace_back(row, col, (row == col ? 4 : 0) + random.vector(1)[0]);
+    }
+  }
+  SparseColumns a(6, 6);
+  a.setFromTriplets(entries.begin(), entries.end());
+  SparseColumns b(6, 4);
+  b.insert(3, 0) = 2;
+  b.insert(0, 1) = -1;
+  b.insert(5, 2) = 1;
+  b.insert(4, 3) = 3;
+  const Factorization factorization(a, "A");
+  const Eigen::MatrixXd expected = Eigen::MatrixXd(a).inverse() * Eigen::MatrixXd(b);
+  const SparseColumns x = factorization.solve(b);
+  EXPECT_LT((Eigen::MatrixXd(x) - expected).norm(), 1e-14);
+  EXPECT_EQ(x.nonZeros(), 9);
+  const Vector one = random.vector(6);
+  EXPECT_LT((a * factorization.solve(one) - one).norm(), 1e-14);
+  const Eigen::MatrixXd product = Eigen::MatrixXd(b).transpose() * expected;
+  EXPECT_LT((Eigen::MatrixXd(factorization.gram(b)) - product).norm(), 1e-14);
+  EXPECT_LT((factorization.gram_diagonal(b) - product.diagonal()).norm(), 1e-14);
 }
 
 TEST(Factorization, gram_keeps_stored_zeros_and_their_signs) {

@@ -6,8 +6,9 @@
 Each model is simulated by FCLIB (Moreau-Jean, the velocity law) from where its file puts it, with
 random controls from a fixed seed, new in each step. Each problem with contacts or joints at their
 limits is solved once more, from nothing and by both merits. A robot of a URDF file moves freely if
-its root is not the world, and a plane lies below it. The files are read, not imported: a package may be installed without what it needs (`pip install --no-deps`), also into a folder of its
-own that PYTHONPATH names.
+its root is not the world, and a plane lies below it. The files are read, not imported: a package
+may be installed without what it needs (`pip install --no-deps`), also into a folder of its own that
+PYTHONPATH names.
 
 An unsolved problem is written to OUT and tried by other solvers, so that one sees whether it is
 hard or whether what is left of it is rounding: ||q|| at most its rounding, or an error of that

@@ -287,7 +287,8 @@ def resolve_packages(path: Path, xml: str, packages: Mapping[str, str | Path]) -
     A folder is known from the argument, is one of ROS_PACKAGE_PATH, or is found as the file's own
     package is: above the file, or beside a folder above it. ValueError if none is known.
     """
-    asked = sorted(set(re.findall(r"package:/{2,3}([^/\"'<>]+)", xml)))
+    xml = xml.replace("package:///", "package://")
+    asked = sorted(set(re.findall(r"package://([^/\"'<>]+)", xml)))
     if not asked:
         return xml
     roots = [Path(root) for root in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if root]
@@ -301,8 +302,7 @@ def resolve_packages(path: Path, xml: str, packages: Mapping[str, str | Path]) -
                 f"{path.name}: no folder is known for package://{package}; name it with --package"
                 f" {package}=DIR (packages= in Python), or set ROS_PACKAGE_PATH"
             )
-        place = f"{found.resolve()}/"
-        xml = re.sub(rf"package:/{{2,3}}{re.escape(package)}/", lambda _, place=place: place, xml)
+        xml = xml.replace(f"package://{package}/", f"{found.resolve()}/")
     if "<mujoco" not in xml:
         # MuJoCo drops folders from the names of a URDF file's meshes unless an option forbids it
         xml = re.sub(

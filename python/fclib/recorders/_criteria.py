@@ -22,7 +22,7 @@ from fclib._origin import origin_of
 
 # meaning of each criterion: 0 for a solution of Coulomb's law
 CRITERIA: Final = {
-    "error": "the larger of both natural maps, as fclib check prints it",
+    "error": "the larger of both natural maps of the contacts",
     "penetration": "how fast contacts close: largest -u_N, over V",
     "tension": "how contacts pull: sum of -r_N if it is negative, over the sum of |r_N|",
     "distance": "what acts at contacts that open: sum of r_N u_N, over V times the sum of |r|",
@@ -85,7 +85,7 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     work = np.sum(r * u, axis=1)
     missing = np.sum(r[:, 1:] * u[:, 1:], axis=1) + mu * np.maximum(normal, 0) * slip
     return {
-        "error": merit.error,
+        "error": max(merit.natural, merit.scaled_natural),
         "penetration": share(float(np.max(-u[:, 0], initial=0)), fastest),
         "tension": share(np.maximum(-normal, 0).sum(), np.abs(normal).sum()),
         "distance": share(float(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0)), power),

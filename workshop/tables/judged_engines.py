@@ -321,7 +321,7 @@ def main() -> None:
         for engine in arguments.engine or ENGINES:
             try:
                 steps = judged(engine, scene, arguments.steps)
-            except (ImportError, ValueError) as error:
+            except (ImportError, ValueError, ChildProcessError) as error:
                 print(f"left out: {engine}: {error}", file=sys.stderr)
                 continue
             if not steps:

@@ -326,22 +326,24 @@ Solution Elimination::expand(const Solution& plain) const {
   return result;
 }
 
-bool Elimination::hold(const GlobalProblem& bodies, const Condensation& condensation,
+void Elimination::hold(const GlobalProblem& bodies, const Condensation& condensation,
                        Solution& solution) const {
-  if (turn_.size() == 0) return false;
-  const auto triangle = turn_.triangularView<Eigen::Upper>();
   const auto correction = [&] {
     RealVector broken = bodies.b.cast<Real>();
     multiply_transposed_add(bodies.G, RealVector(solution.v.cast<Real>()), broken);
-    const Vector left = scale_.cwiseProduct(selected(Vector(broken.cast<double>()), kept_));
-    return multipliers(triangle.transpose().solve(left));
+    Vector left = broken.cast<double>();
+    if (!all_) left = selected(left, kept_);
+    if (nearly_dependent()) {
+      const Vector scaled = scale_.cwiseProduct(left);
+      left = turn_.triangularView<Eigen::Upper>().transpose().solve(scaled);
+    }
+    return multipliers(left);
   };
   solution.l += correction();
   solution = condensation.expand(solution);
   Vector impulse = Vector::Zero(solution.v.size());
   multiply_add(bodies.G, correction(), impulse);
   solution.v += condensation.mass().solve(impulse);
-  return true;
 }
 
 LocalProblem eliminate(const LocalProblem& problem) {

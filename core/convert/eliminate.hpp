@@ -39,11 +39,13 @@ class Elimination {
   /// Completes lambda and u from r.
   [[nodiscard]] Solution expand(const Solution& plain) const;
 
+  /// Whether constraints nearly follow from each other.
+  [[nodiscard]] bool nearly_dependent() const { return turn_.size() > 0; }
+
   /// Makes lambda (p) of a whole solution more accurate, and removes from v (n) what its rounding
-  /// breaks of the constraints: if joints nearly follow from each other, lambda is so large that
-  /// its rounding moves light bodies. Returns false, and changes nothing, if no constraints are so
-  /// close.
-  bool hold(const GlobalProblem& bodies, const Condensation& condensation,
+  /// breaks of the constraints: if joints nearly follow from each other, or reactions between
+  /// joints are large, lambda is so large that its rounding moves light bodies.
+  void hold(const GlobalProblem& bodies, const Condensation& condensation,
             Solution& solution) const;
 
   /// The constraint that follows from the others and contradicts them, if any, and by how much.

@@ -447,15 +447,21 @@ Result solve_global(const P& problem, const P& given, const Request& request,
   const auto judge_expanded = [&](Solution& solution) {
     clear_without_effect(moves, problem.spacedim, solution.r);
     Solution expanded = condensation.expand(elimination.expand(solution));
-    solution = expanded;
-    const bool held = elimination.hold(problem, condensation, solution);
-    const double error = judge_complete(solution);
-    if (!held || error <= request.settings.tolerance) return error;
+    const auto held = [&] {
+      Solution corrected = expanded;
+      elimination.hold(problem, condensation, corrected);
+      return corrected;
+    };
     // the correction of the velocities may be more than the rounding of multipliers explains
-    const double other = judge_complete(expanded);
-    if (!(other <= request.settings.tolerance)) return error;
-    solution = std::move(expanded);
-    return other;
+    const bool first = elimination.nearly_dependent();
+    solution = first ? held() : expanded;
+    const double error = judge_complete(solution);
+    if (error <= request.settings.tolerance) return error;
+    Solution other = first ? std::move(expanded) : held();
+    const double other_error = judge_complete(other);
+    if (!(other_error <= request.settings.tolerance)) return error;
+    solution = std::move(other);
+    return other_error;
   };
   return agreeing(
       problem,

@@ -1246,6 +1246,16 @@ def test_simulate_finds_the_packages_of_a_urdf(tmp_path: Path) -> None:
     assert "--package arm=DIR" in " ".join(refused.output.split())
     done = invoke(*common, "--package", f"arm={tmp_path / 'share' / 'arm'}")
     assert done.exit_code == 0, done.output
+    # a package is also found above the file, after three slashes too
+    own = tmp_path / "share" / "arm" / "urdf" / "arm.urdf"
+    own.parent.mkdir()
+    text = path.read_text(encoding="utf-8").replace("package://", "package:///")
+    own.write_text(text.replace("</robot>", "<xacro:left/></robot>"), encoding="utf-8")
+    done = invoke("simulate", own, *common[2:4], "--out", tmp_path / "own", "--no-pictures")
+    assert done.exit_code == 0, done.output
+    # a prefix that the file does not name keeps no root from floating
+    floating = scenes.Scene.from_file(own, floating=True)
+    assert 'type="floating"' in floating.xml
 
 
 def test_archive_has_the_model_with_its_includes(tmp_path: Path) -> None:

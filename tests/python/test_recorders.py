@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 import math
@@ -861,8 +862,8 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
     for arguments, message in (
         (
             ["nothing", "x.py"],
-            "no engine 'nothing' is recorded; there is: drake, lmgc90, mujoco, newton, pybullet,"
-            " siconos",
+            "no engine 'nothing' is recorded; there is: drake, lmgc90, mujoco, mujoco_warp,"
+            " newton, pybullet, siconos",
         ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):
@@ -949,6 +950,77 @@ def test_mujocos_reaction_gives_its_next_velocity(
     assert contacts > 1
     assert step.assembled.problem.p == 1
     assert fclib.solve(step.problem).converged
+
+
+class Worlds:
+    """Worlds as those of MuJoCo Warp, each kept in MuJoCo's own data."""
+
+    def __init__(self, data: Any, count: int, njmax: int = 1000) -> None:
+        self.worlds = [copy.copy(data) for _ in range(count)]
+        self.nworld, self.njmax = count, njmax
+
+    @property
+    def nefc(self) -> Any:
+        return SimpleNamespace(numpy=lambda: np.array([data.nefc for data in self.worlds]))
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that takes the steps of MuJoCo Warp by MuJoCo."""
+    mujoco = pytest.importorskip("mujoco")
+
+    def step(model: Any, data: Worlds) -> None:
+        for world in data.worlds:
+            mujoco.mj_step(model.source, world)
+
+    module = SimpleNamespace(
+        step=step,
+        put_model=lambda model: SimpleNamespace(source=model),
+        get_data_into=lambda into, model, data, k: mujoco.mj_copyData(into, model, data.worlds[k]),
+        __version__="4.0.0",
+    )
+    monkeypatch.setitem(sys.modules, "mujoco_warp", module)
+
+
+def test_a_world_of_mujoco_warp_gives_mujocos_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    stand_in(monkeypatch)
+    model, data = arm()
+    while data.ncon < 2:
+        mujoco.mj_step(model, data)
+    warp_model, worlds = SimpleNamespace(source=model), Worlds(data, 2)
+    worlds.worlds[0].qvel[:] = 0
+    step = recorders.mujoco_warp(model, warp_model, worlds, 1)
+    own = recorders.mujoco(model, data)
+    assert step.engine == "MuJoCo Warp"
+    assert step.version == "4.0.0"
+    assert "The data are of single precision." in step.notes
+    assert fclib.digest(step.assembled.problem) == fclib.digest(own.assembled.problem)
+    assert step.guess is not None
+    assert own.guess is not None
+    np.testing.assert_array_equal(step.guess.r, own.guess.r)
+    with pytest.raises(ValueError, match="there is no world 2: there are 2"):
+        recorders.mujoco_warp(model, warp_model, worlds, 2)
+    worlds.njmax = 3
+    with pytest.raises(ValueError, match="memory for 3: make njmax larger"):
+        recorders.mujoco_warp(model, warp_model, worlds)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    with pytest.raises(ValueError, match="mjINT_IMPLICITFAST of MuJoCo Warp is not recorded"):
+        recorders.mujoco_warp(model, warp_model, worlds)
+
+
+def test_a_script_of_mujoco_warp_is_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(monkeypatch)
+    model, data = arm()
+    monkeypatch.setitem(sys.modules, "scene", SimpleNamespace(model=model, data=Worlds(data, 1)))
+    script = tmp_path / "drop.py"
+    script.write_text(
+        "import mujoco_warp as mjw\nfrom scene import model, data\n"
+        "made = mjw.put_model(model)\nfor _ in range(6):\n    mjw.step(made, data)\n"
+    )
+    recording = recorders.record_script("mujoco_warp", script, tmp_path / "out", every=5)
+    assert (recording.seen, recording.written) == (6, 2)
 
 
 def test_mujocos_body_at_rest_is_near_coulombs_law() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.sparse as sp
 
 import fclib
 from fclib import collections
@@ -710,3 +711,17 @@ def test_a_table_that_is_no_log_is_said(text: str, word: str, tmp_path: Path) ->
     (tmp_path / "log.npz").write_text("no", encoding="utf-8")
     with pytest.raises(ValueError, match=r"log.npz: is no \.npz file"):
         logged(tmp_path / "log.npz", MujocoModel(Scene(name="pushed", xml=PUSHED)))
+
+
+def test_the_part_of_a_change_that_moves_bodies_is_the_least_that_does() -> None:
+    rng = np.random.default_rng(0)
+    # four directions are pushed, and a fifth one follows from them
+    matrix = rng.normal(size=(5, 4)) @ rng.normal(size=(4, 30))
+    H = sp.csc_array(matrix)
+    change = rng.normal(size=30)
+    part = module.moving_part(H, change)
+    np.testing.assert_allclose(part, np.linalg.pinv(matrix) @ (matrix @ change), atol=1e-12)
+    # what moves nothing is left, whatever its size
+    still = change - part
+    assert np.abs(module.moving_part(H, 1e6 * still)).max() < 1e-8
+    assert not module.moving_part(H, np.zeros(30)).any()

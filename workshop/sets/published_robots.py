@@ -1,13 +1,14 @@
-"""The default solver on the robots that installed Python packages ship as MJCF files.
+"""The default solver on the robots that installed Python packages ship as MJCF or URDF files.
 
     python -m workshop.sets.published_robots OUT [--package metaworld dm_control ...]
         [--model NAME ...] [--steps 100] [--tol 1e-8] [--limit 10] [--every 1] [--results NAME]
 
 Each model is simulated by FCLIB (Moreau-Jean, the velocity law) from where its file puts it, with
 random controls from a fixed seed, new in each step. Each problem with contacts or joints at their
-limits is solved once more, from nothing and by both merits. The files are read, not imported: a
-package may be installed without what it needs (`pip install --no-deps`), also into a folder of its
-own that PYTHONPATH names.
+limits is solved once more, from nothing and by both merits. A robot of a URDF file moves freely if
+its root is not the world, and a plane lies below it. The files are read, not imported: a package
+may be installed without what it needs (`pip install --no-deps`), also into a folder of its own that
+PYTHONPATH names.
 
 An unsolved problem is written to OUT and tried by other solvers, so that one sees whether it is
 hard or whether what is left of it is rounding: ||q|| at most its rounding, or an error of that
@@ -36,6 +37,7 @@ from workshop.tables import _results
 
 # packages whose MJCF files are not robots of others
 NOT_THESE = ("fclib", "mujoco", "mujoco_core", "mujoco_studio")
+GROUND = 0.7  # friction of the plane below a robot of a URDF file, which names none
 UNIT = 32 * np.finfo(float).eps  # of core/merit/equations.cpp: some roundings of each term
 
 
@@ -59,7 +61,7 @@ class Tally:
 
 
 def robots(packages: list[str] | None = None) -> Iterator[Robot]:
-    """The MJCF files of installed packages, package by package; of these names if given."""
+    """The models of installed packages, package by package; of these names if given."""
     wanted = None if packages is None else {_plain(name) for name in packages}
     seen: set[Path] = set()
     for distribution in sorted(metadata.distributions(), key=lambda d: _plain(d.name)):
@@ -68,12 +70,13 @@ def robots(packages: list[str] | None = None) -> Iterator[Robot]:
             continue
         for file in sorted(distribution.files or []):
             path = Path(str(distribution.locate_file(file)))
-            if file.suffix != ".xml" or path in seen or not path.is_file():
+            if file.suffix not in (".xml", ".urdf") or path in seen or not path.is_file():
                 continue
             seen.add(path)
             text = path.read_text(encoding="utf-8", errors="replace")
             # not a part that others include
-            if re.search(r"<mujoco[\s>]", text) and ("<worldbody" in text or "<include" in text):
+            whole = re.search(r"<mujoco[\s>]", text) and re.search("<worldbody|<include", text)
+            if whole or file.suffix == ".urdf":
                 yield Robot(name, path, "/".join(file.parts[1:]))
 
 
@@ -82,9 +85,20 @@ def _plain(name: str) -> str:
     return name.lower().replace("-", "_").replace(".", "_")
 
 
+def scene_of(path: Path) -> Scene:
+    """The scene of a model; raises as `Scene.from_file` does."""
+    if path.suffix != ".urdf":
+        return Scene.from_file(path)
+    try:
+        return Scene.from_file(path, ground=GROUND, floating=True)
+    except ValueError:
+        # its root is the world
+        return Scene.from_file(path, ground=GROUND)
+
+
 def problems(path: Path, steps: int, seed: int = 0, **options: Any) -> Iterator[Any]:
     """The problems of a model's steps, those with contacts; raises as `simulate` does."""
-    scene = Scene.from_file(path)
+    scene = scene_of(path)
     rng = np.random.default_rng(seed)
     for step in simulate(scene, steps, **options):
         model, data = step.model.model, step.model.data  # type: ignore[union-attr]

@@ -3,8 +3,9 @@
     PYTHON -m workshop.tables.judged_engines [--scene slide ...] [--steps 500] [--page FILE]
         [--results judged-engines]
 
-PYTHON has fclib, MuJoCo, Drake, Newton and PyBullet; Siconos has an interpreter of its own
-(fclib.external.siconos). Engines that are not installed are left out, and said. Each engine has its
+PYTHON has fclib, MuJoCo, MuJoCo Warp, Drake, Newton and PyBullet; Siconos has an interpreter of its
+own (fclib.external.siconos). Engines that are not installed are left out, and said, and those whose
+joints are not recorded of the gripper. Each engine has its
 default settings, but for the scene, the time step of 2 ms, Coulomb's coefficient and the damping of
 velocities, which is 0. The criteria are those of `fclib judge`.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 import tempfile
@@ -28,6 +30,7 @@ from workshop.tables import _results
 H = 2e-3  # [s]
 STEPS = 500
 MU = 0.5
+ROOM = 200  # contacts for which MuJoCo Warp keeps memory
 KEPT = 5  # one step in so many is judged
 SICONOS = _results.ROOT / "workshop/sets/_siconos_boxes.py"
 SICONOS_SCALE = "5"  # of edges of 0.2 m
@@ -48,7 +51,13 @@ SCENES = {
     "slide": [Box(CUBE, 2.0, (0, 0, 0.1), (2.0, 0, 0))],
     "stack": [Box(CUBE, 1.0 + i, (0, 0, 0.1 + 0.2 * i)) for i in range(6)],
     "pile": [Box(CUBE, 1.0 + i, (0.06 * i, 0, 0.105 + 0.21 * i)) for i in range(6)],
+    "gripper": [Box(CUBE, 2.0, (0, 0, 1))],
 }
+# boxes on slides along x, each pressed towards x = 0 by PRESS
+PADS = {
+    "gripper": [Box((0.05, 0.1, 0.1), 1.0, (-0.15, 0, 1)), Box((0.05, 0.1, 0.1), 1.0, (0.15, 0, 1))]
+}
+PRESS = 40.0  # [N]
 # two pads on slides press a box by 40 N each, and hold it in the air
 GRIPPER = """
 <mujoco><option timestep="0.002" cone="elliptic"/>
@@ -89,7 +98,7 @@ def words(numbers: Any) -> str:
 
 def scene_text(scene: str) -> str:
     """The scene as MuJoCo's file, with elliptic cones."""
-    if scene == "gripper":
+    if scene in PADS:
         return GRIPPER.replace(
             "<worldbody>", f'<default><geom friction="{MU} 0 0"/></default><worldbody>'
         )
@@ -107,10 +116,24 @@ def mujocos(scene: str, steps: int) -> Iterator[Any]:
         yield recorders.mujoco(model, data)
 
 
-def boxes_of(scene: str) -> list[Box]:
-    """The boxes. ValueError if the scene has joints."""
-    if scene not in SCENES:
-        raise ValueError(f"{scene}: has joints, which are not built here for this engine")
+def mujoco_warps(scene: str, steps: int) -> Iterator[Any]:
+    """MuJoCo Warp's steps, in single precision."""
+    import mujoco
+    import mujoco_warp
+
+    model = mujoco.MjModel.from_xml_string(scene_text(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    warp_model = mujoco_warp.put_model(model)
+    warp_data = mujoco_warp.put_data(model, data, nconmax=ROOM, njmax=4 * ROOM)
+    for _ in range(steps):
+        yield recorders.mujoco_warp(model, warp_model, warp_data)
+
+
+def free_boxes(scene: str) -> list[Box]:
+    """The boxes. ValueError if there are others, on slides."""
+    if scene in PADS:
+        raise ValueError(f"{scene}: has joints, which are not recorded of this engine")
     return SCENES[scene]
 
 
@@ -118,7 +141,7 @@ def drakes(scene: str, steps: int) -> Iterator[Any]:
     """Drake's steps, judged by the law of rigid contacts."""
     import pydrake.all as drake
 
-    boxes = boxes_of(scene)
+    boxes, pads = SCENES[scene], PADS.get(scene, [])
     builder = drake.DiagramBuilder()
     plant, _ = drake.AddMultibodyPlantSceneGraph(builder, H)
     plant.set_contact_model(drake.ContactModel.kPoint)
@@ -135,7 +158,7 @@ def drakes(scene: str, steps: int) -> Iterator[Any]:
     plant.RegisterCollisionGeometry(
         plant.world_body(), floor, drake.Box(90, 90, 1), "floor", properties()
     )
-    for i, box in enumerate(boxes):
+    for i, box in enumerate([*boxes, *pads]):
         edges = [2 * half for half in box.half]
         body = plant.AddRigidBody(
             f"box{i}", drake.SpatialInertia.SolidBoxWithMass(box.mass, *edges)
@@ -149,9 +172,21 @@ def drakes(scene: str, steps: int) -> Iterator[Any]:
             plant.RegisterCollisionGeometry(
                 body, drake.RigidTransform(corner), drake.Sphere(1e-4), f"{i}.{k}", properties()
             )
+    for i, pad in enumerate(pads, len(boxes)):
+        place = drake.RigidTransform(list(pad.place))
+        start = drake.FixedOffsetFrame(f"start{i}", plant.world_frame(), place)
+        joint = drake.PrismaticJoint(
+            f"slide{i}",
+            plant.AddFrame(start),
+            plant.GetBodyByName(f"box{i}").body_frame(),
+            [-math.copysign(1, pad.place[0]), 0, 0],
+        )
+        plant.AddJointActuator(f"press{i}", plant.AddJoint(joint))
     plant.Finalize()
     simulator = drake.Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    if pads:
+        plant.get_actuation_input_port().FixValue(context, [PRESS] * len(pads))
     for i, box in enumerate(boxes):
         body = plant.GetBodyByName(f"box{i}")
         plant.SetFreeBodyPose(context, body, drake.RigidTransform(list(box.place)))
@@ -166,7 +201,7 @@ def bullets(scene: str, steps: int) -> Iterator[Any]:
     """PyBullet's steps."""
     import pybullet as bullet
 
-    boxes = boxes_of(scene)
+    boxes = free_boxes(scene)
     client = bullet.connect(bullet.DIRECT)
     bullet.setGravity(0, 0, -9.81)
     bullet.setTimeStep(H)
@@ -189,7 +224,7 @@ def newtons(scene: str, steps: int) -> Iterator[Any]:
     import newton
     import warp
 
-    boxes = boxes_of(scene)
+    boxes, pads = SCENES[scene], PADS.get(scene, [])
     builder = newton.ModelBuilder()
     newton.solvers.SolverKamino.register_custom_attributes(builder)
     kind = newton.ModelBuilder.ShapeConfig
@@ -199,22 +234,32 @@ def newtons(scene: str, steps: int) -> Iterator[Any]:
         x, y, z = box.half
         material = kind(mu=MU, density=box.mass / (8 * x * y * z))
         builder.add_shape_box(body, hx=x, hy=y, hz=z, cfg=material)
+    for pad in pads:
+        place = warp.transform(warp.vec3(*pad.place), warp.quat_identity())
+        body = builder.add_link(xform=place)
+        x, y, z = pad.half
+        material = kind(mu=MU, density=pad.mass / (8 * x * y * z))
+        builder.add_shape_box(body, hx=x, hy=y, hz=z, cfg=material)
+        axis = warp.vec3(-math.copysign(1, pad.place[0]), 0, 0)
+        joint = builder.add_joint_prismatic(-1, body, parent_xform=place, axis=axis)
+        builder.add_articulation([joint])
     model = builder.finalize(device="cpu")
     solver = newton.solvers.SolverKamino(
         model, newton.solvers.SolverKamino.Config(use_collision_detector=True)
     )
-    states = [model.state(), model.state()]
-    speeds = [[*box.velocity, 0.0, 0.0, 0.0] for box in boxes]
+    states, control = [model.state(), model.state()], model.control()
+    control.joint_f.assign([0.0] * (6 * len(boxes)) + [PRESS] * len(pads))
+    speeds = [[*box.velocity, 0.0, 0.0, 0.0] for box in [*boxes, *pads]]
     states[0].body_qd.assign(speeds)
     for _ in range(steps):
-        solver.step(*states, None, None, H)
+        solver.step(*states, control, None, H)
         states.reverse()
         yield recorders.newton(solver)
 
 
 def siconoses(scene: str, steps: int) -> Iterator[Any]:
     """Siconos' steps."""
-    boxes = json.dumps([asdict(box) for box in boxes_of(scene)])
+    boxes = json.dumps([asdict(box) for box in free_boxes(scene)])
     yield from recorders.siconos(SICONOS, arguments=[str(steps), str(H), SICONOS_SCALE, boxes])
 
 
@@ -240,6 +285,7 @@ class Own:
 
 ENGINES: dict[str, Callable[[str, int], Iterator[Any]]] = {
     "MuJoCo": mujocos,
+    "MuJoCo Warp": mujoco_warps,
     "Drake": drakes,
     "Newton": newtons,
     "PyBullet": bullets,
@@ -262,7 +308,7 @@ def judged(engine: str, scene: str, steps: int) -> list[recorders.Judgement]:
 def main() -> None:
     """Print the table, and store it."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    every = [*SCENES, "gripper"]
+    every = list(SCENES)
     parser.add_argument("--scene", action="append", choices=every)
     parser.add_argument("--engine", action="append", choices=list(ENGINES))
     parser.add_argument("--steps", type=int, default=STEPS)
@@ -275,7 +321,7 @@ def main() -> None:
         for engine in arguments.engine or ENGINES:
             try:
                 steps = judged(engine, scene, arguments.steps)
-            except (ImportError, ValueError) as error:
+            except (ImportError, ValueError, ChildProcessError) as error:
                 print(f"left out: {engine}: {error}", file=sys.stderr)
                 continue
             if not steps:

@@ -14,7 +14,7 @@ def command(
     engine: Annotated[
         str,
         typer.Argument(
-            help="drake, lmgc90, mujoco, newton, pybullet or siconos, which must be installed.",
+            help="drake, lmgc90, mujoco, mujoco_warp, newton, pybullet or siconos, installed.",
             show_default=False,
         ),
     ],

@@ -46,8 +46,10 @@ def mujoco(model: Any, data: Any) -> Recorded:
     return record(module, model, data, module.mj_step)
 
 
-def record(mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None]) -> Recorded:
-    """As `mujoco`, for the module and its stepping function."""
+def record(
+    mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None], exact: float = EXACT
+) -> Recorded:
+    """As `mujoco`, for the module and its stepping function; `exact` is in place of EXACT."""
     known = {
         mj.mjtIntegrator.mjINT_EULER: "Euler",
         mj.mjtIntegrator.mjINT_IMPLICITFAST: "implicitfast",
@@ -140,7 +142,7 @@ def record(mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None]) -> 
         },
     )
     off = recorded.mismatch or 0.0
-    if off <= EXACT * max(1.0, float(np.abs(recorded.velocity).max(initial=0.0))):
+    if off <= exact * max(1.0, float(np.abs(recorded.velocity).max(initial=0.0))):
         return recorded
     # a force that the integrator treats in a way of its own, as damping that is not linear
     return replace(

@@ -13,7 +13,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from fclib.recorders import _drake, _lmgc90, _mujoco, _newton, _pybullet, _siconos
+from fclib.recorders import (
+    _drake,
+    _lmgc90,
+    _mujoco,
+    _mujoco_warp,
+    _newton,
+    _pybullet,
+    _siconos,
+)
 from fclib.recorders._recorded import Recording
 
 
@@ -62,6 +70,36 @@ def _steps_of_mujoco(recording: Recording) -> Iterator[None]:
         yield
     finally:
         mj.mj_step = original
+
+
+@contextmanager
+def _steps_of_mujoco_warp(recording: Recording) -> Iterator[None]:
+    warp: Any = importlib.import_module("mujoco_warp")
+    original, put = warp.step, warp.put_model
+    models: list[tuple[Any, Any]] = []  # MuJoCo's model, and the one that was made of it
+
+    def put_model(mjm: Any, *arguments: Any, **options: Any) -> Any:
+        models.append((mjm, put(mjm, *arguments, **options)))
+        return models[-1][1]
+
+    def step(m: Any, d: Any) -> None:
+        source = next((mjm for mjm, made in models if made is m), None)
+        taken: list[bool] = []
+
+        def once(m: Any, d: Any) -> None:
+            original(m, d)
+            taken.append(True)
+
+        if source is not None:
+            recording.take(partial(_mujoco_warp.record, warp, source, m, d, once))
+        if not taken:  # the step was not kept, or is left out
+            original(m, d)
+
+    warp.step, warp.put_model = step, put_model
+    try:
+        yield
+    finally:
+        warp.step, warp.put_model = original, put
 
 
 @contextmanager
@@ -176,6 +214,7 @@ ENGINES: Final[dict[str, Callable[..., None]]] = {
     "drake": _in_this_process(_steps_of_drake, "pydrake"),
     "lmgc90": _lmgc90.record,
     "mujoco": _in_this_process(_steps_of_mujoco, "mujoco"),
+    "mujoco_warp": _in_this_process(_steps_of_mujoco_warp, "mujoco_warp"),
     "newton": _in_this_process(_steps_of_newton, "newton"),
     "pybullet": _in_this_process(_steps_of_pybullet, "pybullet"),
     "siconos": _siconos.record,

@@ -10,12 +10,12 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
 from fclib import _core, _geometry, _laws, _solve
 from fclib._origin import origin_of
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
+from fclib.simulate.arrays import Sparse, columns_of, submatrix
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.equalities import RANK, dependence, gaps_of
 from fclib.simulate.geometry import places_of
@@ -27,6 +27,7 @@ from fclib.simulate.moreau_jean import (
     StepProblem,
     System,
     Vector,
+    block_columns,
     keys,
 )
 from fclib.simulate.mujoco_model import MujocoModel
@@ -272,22 +273,52 @@ def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vecto
     returns any of these, so that the reactions of a body at rest would change from step to step.
     """
     d = problem.spacedim
-    u = np.abs(np.asarray(_core.contact_merits(problem, solution)["u"])).reshape(-1, d)
+    u = np.abs(np.asarray(solution.u)).reshape(-1, d)
+    M, H = problem.M, problem.H
     # velocities without reactions, except for coupled degrees of freedom
-    free = np.abs(problem.f) / np.abs(sp.csc_array(problem.M).diagonal())
+    free = np.abs(problem.f) / np.abs(M.diagonal())
     closed = solution.r[::d] > 0
     if not closed.any() or u[closed].max() > STILL * free.max():
         return None
-    sticks = np.repeat(closed, d)
-    H = sp.csc_array(problem.H)[:, sticks]
-    if H.shape[1] <= np.count_nonzero(np.diff(sp.csr_array(H).indptr)):
+    H = submatrix(H, block_columns(np.flatnonzero(closed), d))
+    if H.shape[1] <= np.count_nonzero(np.bincount(H.indices)):
         return None  # they are unique: as many as the directions that they push
+    sticks = np.repeat(closed, d)
     change = r[sticks] - solution.r[sticks]
-    # the part of the change that moves bodies
-    moving = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
     found: Vector = np.array(solution.r)
-    found[sticks] += change - moving
+    found[sticks] += change - moving_part(H, change)
     return found
+
+
+def moving_part(H: Sparse, change: Vector) -> Vector:
+    """The part H^T y of a change of reactions (m) that moves bodies: the rest has H dr = 0.
+
+    By conjugate gradients on H H^T y = H change: the least x with H x = H change.
+    """
+    columns = columns_of(H)
+
+    def moved(x: Vector) -> Vector:
+        sums = np.bincount(H.indices, H.data * x.take(columns), H.shape[0])
+        return np.asarray(sums, dtype=float)
+
+    def pushed(y: Vector) -> Vector:
+        sums = np.bincount(columns, H.data * y.take(H.indices), H.shape[1])
+        return np.asarray(sums, dtype=float)
+
+    left = moved(change)
+    sizes = np.bincount(H.indices, np.abs(H.data * change.take(columns)))
+    least, square = EXACT**2 * (sizes @ sizes), left @ left
+    part = np.zeros(len(change))
+    direction = pushed(left)
+    for _ in range(MOST):
+        if square <= least or not direction.any():
+            break
+        step = square / (direction @ direction)
+        part += step * direction
+        left -= step * moved(direction)
+        before, square = square, left @ left
+        direction = pushed(left) + square / before * direction
+    return part
 
 
 def in_range(values: Vector, bound: float) -> bool:

@@ -149,7 +149,7 @@ class Scene:
             return cls._of_mechanics(path, time_step, restitution, law, activation)
         xml = path.read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
-        resolved = resolve_packages(path.name, xml, packages or {})
+        resolved = resolve_packages(path, xml, packages or {})
         files, includes = references_of(path, resolved)
         return cls(
             name=path.stem,
@@ -281,22 +281,25 @@ def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]
     return hashes, texts
 
 
-def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) -> str:
+def resolve_packages(path: Path, xml: str, packages: Mapping[str, str | Path]) -> str:
     """A URDF text with the folders of its package://NAME/... in their places.
 
-    ValueError if one is known neither from the argument nor as a folder of ROS_PACKAGE_PATH.
+    A folder is known from the argument, is one of ROS_PACKAGE_PATH, or is found as the file's own
+    package is: above the file, or beside a folder above it. ValueError if none is known.
     """
+    xml = xml.replace("package:///", "package://")
     asked = sorted(set(re.findall(r"package://([^/\"'<>]+)", xml)))
     if not asked:
         return xml
     roots = [Path(root) for root in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if root]
+    roots += path.resolve().parents
     for package in asked:
         folders = [Path(packages[package])] if package in packages else []
         folders += [root / package for root in roots]
         found = next((folder for folder in folders if folder.is_dir()), None)
         if found is None:
             raise ValueError(
-                f"{name}: no folder is known for package://{package}; name it with --package"
+                f"{path.name}: no folder is known for package://{package}; name it with --package"
                 f" {package}=DIR (packages= in Python), or set ROS_PACKAGE_PATH"
             )
         xml = xml.replace(f"package://{package}/", f"{found.resolve()}/")
@@ -311,7 +314,7 @@ def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) ->
 def floated(name: str, xml: str) -> str:
     """A URDF text whose root moves freely. ValueError: it is not URDF, or its root is the world."""
     try:
-        robot = ElementTree.fromstring(xml.encode())
+        robot = ElementTree.fromstring(with_prefixes(xml).encode())
     except ElementTree.ParseError as error:
         raise ValueError(f"{name}: is no XML: {error}") from None
     if robot.tag != "robot":
@@ -333,6 +336,14 @@ def floated(name: str, xml: str) -> str:
         f'<parent link="world"/><child link={quoteattr(roots[0])}/></joint>'
     )
     return re.sub(r"(<robot\b[^>]*>)", lambda found: found[0] + joint, xml, count=1)
+
+
+def with_prefixes(xml: str) -> str:
+    """A URDF text whose root names all prefixes of tags: tools of ROS leave some out."""
+    used = set(re.findall(r"[</\s]([A-Za-z_][\w.-]*):[A-Za-z_]", xml)) - {"xml", "xmlns"}
+    unknown = [prefix for prefix in sorted(used) if f"xmlns:{prefix}" not in xml]
+    words = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in unknown)
+    return re.sub(r"<robot\b", lambda found: found[0] + words, xml, count=1)
 
 
 @dataclass(frozen=True, kw_only=True)

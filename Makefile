@@ -24,7 +24,7 @@ HAS_NPM := $(shell command -v npm)
 NO_NPM := @echo "== there is no npm: JavaScript is not checked (apt-get install npm)"
 
 .PHONY: setup demo test test-long wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
-        collection-wheel results-wheel campaigns deb release clean help
+        collection-wheel results-wheel published-site campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -49,6 +49,7 @@ help:
 	@echo "             METIS_SOURCE=FOLDER: their sources, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
 	@echo "make results-wheel     the published runs, as a wheel, into dist/results"
+	@echo "make published-site    a site of the published runs, into $(BUILD)/published-site"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make campaigns  run the published campaigns, BUDGET=10min each, and pack stores and tables"
 	@echo "make deb     the C library as Debian packages, into dist/"
@@ -166,6 +167,11 @@ collection-wheel: setup $(VENV)/.package-tools
 	rm -rf dist/collection
 	$(BIN)/python -m build --wheel --outdir dist/collection collection
 	$(BIN)/python scripts/check_collection.py dist/collection/*.whl
+
+# from the packages alone: nothing is built or run
+published-site: setup
+	$(BIN)/fclib report --with published --merit both --catalog tiny --with-files \
+	  --title "Published runs" --out $(BUILD)/published-site
 
 results-wheel: setup $(VENV)/.package-tools
 	$(BIN)/fclib results verify --in results/fclib_results/runs

@@ -116,7 +116,9 @@ def test_what_is_packed_comes_back(tmp_path: Path) -> None:
             for one in (old, back)
         )
         assert first == second
-        assert back.history(1) == old.history(1)
+        for first_report, second_report in zip(back.history(1), old.history(1), strict=True):
+            assert first_report[::3] == second_report[::3]
+            assert first_report[1:3] == pytest.approx(second_report[1:3], rel=1e-6)
         assert back.mend() == 0
 
 
@@ -345,3 +347,85 @@ def test_the_commands(tmp_path: Path) -> None:
     shutil.rmtree(parts)
     parts.mkdir()
     assert "no part" in said("results", "verify", "--in", parts, code=1)
+
+
+def test_a_long_history_is_thinned_and_keeps_its_ends() -> None:
+    from fclib.results.shards import REPORTS, thinned
+
+    found = thinned([(k, 1.0 / (k + 1), 0.1 * k, "") for k in range(10_000)])
+    assert (found[0]["iteration"], found[-1]["iteration"]) == (0, 9999)
+    assert REPORTS / 2 < len(found) <= REPORTS + 2
+    assert found[-1]["error"] == pytest.approx(1e-4)
+    assert len(thinned([(1, 1.0, 0.0, "")])) == 1
+    assert thinned([]) == []
+
+
+def test_published_runs_count_under_a_smaller_limit(tmp_path: Path) -> None:
+    """Theirs is 10 s, mine is 1 s: what took 2 s has failed, and what took less is solved."""
+    part = packed(tmp_path, speed=1.0, cpu=2.0)
+    plan = {**PLAN, "solvers": ["ppa-nsn"], "time_limit": 1.0}
+    own = Record("converged", cpu_s=0.1, merits={"error": 0.0}, machine=facts("mine", 1.0))
+    mine = tmp_path / "mine.sqlite"
+    with bench.Store(mine) as opened:
+        opened.add_all([(job, own) for job in bench.Campaign.of(plan).plan()])
+    with results.beside(mine, [part]) as found, bench.Store(found.path) as opened:
+        rows = [row for row in opened.table() if row["solver"] != "ppa-nsn"]
+    assert {(row["status"], row["time_limit"]) for row in rows} == {("time_limit", 1.0)}
+    assert len(rows) == 16
+    larger = {**plan, "time_limit": 100.0}
+    with bench.Store(tmp_path / "larger.sqlite") as opened:
+        opened.add_all([(job, own) for job in bench.Campaign.of(larger).plan()])
+    with (
+        pytest.raises(results.BesideError, match="limits or larger"),
+        results.beside(tmp_path / "larger.sqlite", [part]),
+    ):
+        pass
+
+
+def test_published_runs_alone_are_on_one_scale(tmp_path: Path) -> None:
+    part = packed(tmp_path, speed=2.0)
+    (tmp_path / "more").mkdir()
+    slow = store(tmp_path / "more" / "slow.sqlite", facts("slow", 4.0), ["ppa-nsn"])
+    with bench.Store(slow) as opened:
+        other = results.pack(opened, tmp_path / "parts", "small", "slow")
+    assert other is not None
+    with results.alone([part, other]) as found, bench.Store(found.path) as opened:
+        cpu = {row["solver"]: row["cpu_s"] for row in opened.table()}
+        assert {row["node"] for row in opened.table()} == {"fast"}
+    assert cpu == {
+        "nsgs": pytest.approx(0.01),
+        "apgd": pytest.approx(0.01),
+        "ppa-nsn": pytest.approx(0.005),
+    }
+    with pytest.raises(results.ShardError, match="no runs"), results.alone([]):
+        pass
+
+
+def test_a_solver_of_a_file_is_run_beside_published_ones(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`fclib bench CAMPAIGN --solver mine.py --with PART`: mine alone is run."""
+    (tmp_path / "walk_mine.py").write_text(
+        "import fclib\n\n\n@fclib.solver('walk-mine')\n"
+        "def solve(problem, r, monitor):\n    r[:] = fclib.solve(problem, 'nsgs').solution.r\n"
+        "    monitor.stop(r)\n"
+    )
+    campaign = tmp_path / "small.toml"
+    campaign.write_text(
+        'solvers = ["nsgs", "apgd"]\ntolerances = [1e-4]\n[[problems]]\nfamily = "planted"\n'
+        "planted = { count = 4, contacts = 5, seed = 1 }\n"
+    )
+    part = packed(tmp_path)
+    calibration.save(CALIBRATED)
+    words = [
+        *("bench", str(campaign), "--solver", str(tmp_path / "walk_mine.py")),
+        *("--with", str(part), "--store", str(tmp_path / "mine.sqlite")),
+    ]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert "8 published runs" in " ".join(done.output.split())
+    with bench.Store(tmp_path / "mine.sqlite") as opened:
+        assert {row["solver"] for row in opened.table()} == {"walk-mine"}
+    for name in ("nsgs", "apgd", "walk-mine"):
+        assert name in done.output
+    assert CliRunner().invoke(app, ["bench", str(campaign), "--with", str(part)]).exit_code == 2

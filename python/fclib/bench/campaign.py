@@ -38,9 +38,11 @@ KNOWN = {
     "name",
     "title",
     "tolerances",
+    "from_history",
     "merit",
     *NUMBERS,
     "repeats",
+    "repeated",
     "threads",
     "seed",
     "history",
@@ -50,6 +52,7 @@ KNOWN = {
     "solvers",
     "problems",
 }
+LATER = 0.05  # a repeat comes after so much more of the campaign
 DEFAULTS: Mapping[str, Any] = {"tolerances": [1e-8], "time_limit": 10.0, "memory": 4000.0}
 WHAT = {"files", "set", "simulate", "planted"}  # a group of problems has exactly one of these
 KNOWN_OF_PROBLEMS = {"family", "form", "sample", "tolerances", *WHAT, *NUMBERS}
@@ -113,6 +116,9 @@ class Campaign:
     groups: tuple[Group, ...]
     title: str = ""
     repeats: int = 1
+    repeated: float = 1.0  # share of the problems that are repeated, and whose solutions are kept
+    # larger tolerances, at which runs of built-in solvers are read off their histories: reached.py
+    from_history: tuple[float, ...] = ()
     threads: int = 1
     seed: int = 0
     history: bool = False
@@ -187,6 +193,10 @@ class Campaign:
             raise CampaignError(f"modules: {error}") from None
         choices, missing = _solvers(entries.get("solvers"), modules)
         rows = _tables(entries)
+        groups = tuple(_group(row, entries, k) for k, row in enumerate(rows))
+        larger = _larger(entries)
+        if larger and min(larger) <= max(tol for group in groups for tol in group.tolerances):
+            raise CampaignError("from_history: has a tolerance that is not larger than all others")
         seed = entries.get("seed", 0)
         if not isinstance(seed, int):
             raise CampaignError(f"seed: {seed!r} is not a whole number")
@@ -194,8 +204,10 @@ class Campaign:
             name=str(entries.get("name", "campaign")),
             title=str(entries.get("title", "")),
             solvers=choices,
-            groups=tuple(_group(row, entries, k) for k, row in enumerate(rows)),
+            groups=groups,
             repeats=_count(entries, "repeats", 1),
+            repeated=_share(entries, "repeated"),
+            from_history=larger,
             threads=_count(entries, "threads", 1),
             seed=seed,
             history=_yes(entries, "history"),
@@ -221,8 +233,10 @@ class Campaign:
 
         They go repeat by repeat, each shuffled.
 
-        If there is a budget, they go problem after problem. So the budget is spread evenly over the
-        groups and families, and every problem that was begun has been solved by all solvers.
+        If there is a budget, or if only a share of the problems is repeated, they go problem after
+        problem. So a part of the campaign is spread evenly over the groups and families, and every
+        problem that was begun has been solved by all solvers. The repeats of a share come between
+        the other problems, some time after the first run.
 
         Args:
             store: files that it knows are not read again.
@@ -256,24 +270,69 @@ class Campaign:
                 of = group.set or steps[0].family
                 sequences.append((group.sequence.name(of), steps, group))
                 problems.check_names(steps[0].path, steps[0].kind)
+        again = self._repeated(found, sequences)
         random_order = random.Random(self.seed)
-        jobs: dict[str, Job] = {}
+        order: list[Job] = []
         for repeat in range(self.repeats):
             ours = [
-                self._job(facts, group, choice, tol, repeat)
+                job
                 for facts, group in found
+                if not repeat or facts.hash in again
                 for choice in self.solvers
-                for tol in group.tolerances
+                for job in self._jobs(facts, group, choice, repeat, facts.hash in again)
             ]
             for name, steps, group in sequences:
+                if repeat and steps[0].hash not in again:
+                    continue
                 for choice in self.solvers:
                     for tol in group.tolerances:
                         ours += self._chain(name, steps, group, choice, tol, repeat)
             random_order.shuffle(ours)
-            if self.budget is not None:
+            if self.budget is not None and self.repeated == 1:
                 ours = spread(ours)
-            for job in ours:
-                jobs.setdefault(job.key, job)  # a problem that has two names is run once
+            order += ours
+        if self.repeated < 1:
+            order = spread(order)
+        jobs: dict[str, Job] = {}
+        for job in order:
+            jobs.setdefault(job.key, job)  # a problem that has two names is run once
+        return jobs
+
+    def _repeated(
+        self,
+        found: Sequence[tuple[ProblemFacts, Group]],
+        sequences: Sequence[tuple[str, list[ProblemFacts], Group]],
+    ) -> set[str]:
+        """The problems that are repeated: a share of each group, evenly spread, and of sequences.
+
+        All steps of a sequence are repeated, or none.
+        """
+        own: dict[int, list[str]] = defaultdict(list)
+        for facts, group in found:
+            if group.sequence is None:
+                own[id(group)].append(facts.hash)
+        chosen = {name for names in own.values() for name in share_of(names, self.repeated)}
+        for _, steps, _ in share_of(sequences, self.repeated):
+            chosen |= {facts.hash for facts in steps}
+        return chosen
+
+    def _jobs(
+        self, facts: ProblemFacts, group: Group, choice: SolverChoice, repeat: int, again: bool
+    ) -> list[Job]:
+        """The jobs of a solver on a problem, at all tolerances."""
+        keep = group.sequence is not None or (again and self.repeated < 1 and not repeat)
+        known = self.from_history if group.sequence is None else ()
+        jobs = [
+            replace(self._job(facts, group, choice, tol, repeat), keep=keep)
+            for tol in group.tolerances
+        ]
+        least = min(jobs, key=lambda job: job.tol)
+        believed = choice.origin == "fclib"  # what another solver reports is not believed
+        if known and believed:
+            jobs[jobs.index(least)] = least = replace(least, history=True)
+        for tol in known:
+            job = self._job(facts, group, choice, tol, repeat)
+            jobs.append(replace(job, off=least.key) if believed else job)
         return jobs
 
     def _job(
@@ -348,16 +407,29 @@ class Campaign:
 
 
 def spread(jobs: Sequence[Job]) -> list[Job]:
-    """The jobs in an order whose first part has all jobs of its problems, of all families."""
-    families: dict[str, dict[str, list[Job]]] = defaultdict(lambda: defaultdict(list))
+    """The jobs in an order whose first part has all jobs of its problems, of all families.
+
+    If there are repeats among them, each comes `LATER` than the run before it.
+    """
+    families: dict[str, dict[str, dict[int, list[Job]]]] = defaultdict(
+        lambda: defaultdict(lambda: defaultdict(list))
+    )
     for job in jobs:
-        families[job.problem.family][job.problem.hash].append(job)
+        families[job.problem.family][job.problem.hash][job.repeat].append(job)
     places = [
-        ((k + 0.5) / len(own), family, own[digest])
+        ((k + 0.5) / len(own) + LATER * (repeat - min(repeats)), family, repeat, part)
         for family, own in families.items()
-        for k, digest in enumerate(own)
+        for k, repeats in enumerate(own.values())
+        for repeat, part in repeats.items()
     ]
-    return [job for *_, part in sorted(places, key=lambda place: place[:2]) for job in part]
+    return [job for *_, part in sorted(places, key=lambda place: place[:3]) for job in part]
+
+
+def share_of(names: Sequence[Any], share: float) -> list[Any]:
+    """A share of some things, evenly spread: one at least if there is any."""
+    count = max(1, round(share * len(names)))
+    first = 0.5 * (len(names) / count - 1)
+    return [names[int(first + k * len(names) / count)] for k in range(count)] if names else []
 
 
 def published_means(store: str | Path) -> dict[tuple[str, float], float]:
@@ -439,6 +511,22 @@ def _yes(entries: Mapping[str, Any], name: str, where: str = "") -> bool:
     if not isinstance(value, bool):
         raise CampaignError(f"{where}{name}: {value!r} is neither true nor false")
     return value
+
+
+def _share(entries: Mapping[str, Any], name: str) -> float:
+    """A share of 1; 1 if it is left out."""
+    value = _positive(entries.get(name, 1.0), name)
+    if value > 1:
+        raise CampaignError(f"{name}: {value:g} is above 1")
+    return value
+
+
+def _larger(entries: Mapping[str, Any]) -> tuple[float, ...]:
+    """The tolerances that are read off histories."""
+    values = entries.get("from_history", [])
+    if not isinstance(values, list):
+        raise CampaignError("from_history: is no list of tolerances, as in from_history = [1e-4]")
+    return tuple(_positive(value, "from_history") for value in values)
 
 
 def _made(recipe: Mapping[str, Any], where: str) -> None:

@@ -173,6 +173,8 @@ class Job:
     keep: bool = False  # whether the solution is stored
     guess: Guess | None = None  # known once the run begins; `along` decides it
     renumber: bool = False  # whether each repeat but the first is of a copy: copies.py
+    # key of the run at a smaller tolerance whose history may answer this job: reached.py
+    off: str = ""
 
     @property
     def start(self) -> str:
@@ -195,7 +197,14 @@ class Job:
             parts.append(json.dumps(["after", self.along.after]))
         if self.copy:
             parts.append('"copy"')
+        if self.off:
+            parts.append('"off"')
         return hashlib.sha256(f"[{', '.join(parts)}]".encode()).hexdigest()[:32]
+
+    @property
+    def after(self) -> str:
+        """The key of the run that this one waits for; empty if there is none."""
+        return self.along.after if self.along else self.off
 
     @property
     def copy(self) -> int:

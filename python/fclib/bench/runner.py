@@ -18,6 +18,7 @@ from fclib._verdicts import SOLVED
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Guess, Job, Record, Runner
+from fclib.bench.reached import read_off
 from fclib.bench.store import Store
 from fclib.bench.table import Table
 
@@ -91,7 +92,7 @@ class Queue(Iterator[Job]):
         """The next job. Jobs that came back are last, and are dropped if they are too many."""
         while self.jobs and not (self.again and self.troubled):
             job = self.jobs.popleft()
-            after = job.along.after if job.along else ""
+            after = job.after
             if after in self.gone:
                 self.left(job, self.gone[after])
                 self.leave(job, self.gone[after])
@@ -176,6 +177,14 @@ def with_guess(job: Job, by_key: Mapping[str, Job], store: Store) -> Job:
     return job
 
 
+def read_off_from(store: Store, job: Job) -> Record | None:
+    """The record of a job by the run at a smaller tolerance; None if it must be run."""
+    run = store.run_of(job.off)
+    if run is None:
+        return None
+    return read_off(run, store.history(run["id"]), job.tol, store.machine_of(run))
+
+
 def run_campaign(
     campaign: Campaign,
     store: str | Path,
@@ -231,9 +240,16 @@ def run_campaign(
         by_key = {key: job for key, job in plan.items() if job.along}
 
         def begin(job: Job) -> Job | None:
-            """The job; None if another campaign has done it, or the budget is too small."""
+            """The job; None if it is done already, by another campaign or by the run it is read off
+            from, or if the budget is too small.
+            """
             if opened.has(job.key):
                 progress.skipped += 1
+                queue.finish(job)
+                return None
+            if job.off and (record := read_off_from(opened, job)) is not None:
+                opened.add(job, record, number)
+                progress.statuses[record.status] += 1
                 queue.finish(job)
                 return None
             if campaign.budget is not None and progress.spent >= campaign.budget:

@@ -738,7 +738,7 @@ class Store:
             job.start,
             *((job.along.sequence, job.along.step) if job.along else (None, None)),
             job.guess.step if job.guess and record.guessed else None,
-            job.along.after if job.along else None,
+            job.after or None,
         ]
         marks = ", ".join("?" * len(RUN))
         cursor = self.db.execute(
@@ -893,18 +893,27 @@ class Store:
         return None
 
     def solution(self, run: int) -> dict[str, npt.NDArray[np.float64]]:
-        """The vectors u, r and l that a run of a sequence found; empty if it did not solve."""
+        """The vectors u, r and l that a run found; empty if they are not stored."""
         for row in self._read("solutions", "run = ?", (run,)):
             return {name: np.frombuffer(row[name]) for name in KEPT if row[name] is not None}
         return {}
 
+    def with_solutions(self) -> list[int]:
+        """The runs whose solutions are stored, in their order."""
+        return [row["run"] for row in self._read("solutions")]
+
+    def run_of(self, key: str) -> dict[str, Any] | None:
+        """The run of a key, in the columns of the table `runs`; None if there is none."""
+        for run in self._read("runs", "key = ?", (key,)):
+            if run["key"] == key:  # an index may be damaged
+                return run
+        return None
+
     def solution_of(self, key: str) -> tuple[bytes, bytes | None] | None:
         """The reactions and multipliers that the run of a key found; None if it found none."""
-        for run in self._read("runs", "key = ?", (key,)):
-            if run["key"] != key:
-                continue  # an index may be damaged
-            for row in self._read("solutions", "run = ?", (run["id"],)):
-                return row["r"], row["l"]
+        run = self.run_of(key)
+        for row in self._read("solutions", "run = ?", (run["id"],)) if run else ():
+            return row["r"], row["l"]
         return None
 
     def texts(self) -> list[str]:
@@ -1066,6 +1075,11 @@ class Store:
     def machines(self) -> dict[str, dict[str, Any]]:
         """The facts of the machines of all runs, by the column `machine`."""
         return {row["hash"]: object_in(row["facts"]) for row in self._by_number("machine").values()}
+
+    def machine_of(self, run: Mapping[str, Any]) -> dict[str, Any]:
+        """The facts of the machine of a run, given in the columns of the table `runs`."""
+        rows = self._read("machines", "id = ?", (run["machine"],))
+        return next((object_in(row["facts"]) for row in rows), {})
 
     def kinds(self) -> dict[str, str]:
         """The kind of each problem, by its hash."""

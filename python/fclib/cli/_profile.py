@@ -38,12 +38,23 @@ AsMeasured = Annotated[
 
 @contextmanager
 def joined(
-    store: Path, beside: Sequence[str] | None, machine: str | None, as_measured: bool
+    store: Path | None, beside: Sequence[str], machine: str | None, as_measured: bool
 ) -> Iterator[tuple[Path, str]]:
-    """The store, with published runs beside its own if they are asked for, and a note on them."""
-    if not beside:
-        yield store, ""
-        return
+    """The store with published runs beside its own, and a note on them; without a store, these."""
+    from fclib import results
+
+    parts = parts_of(beside)
+    scaled = "" if not as_measured else ", as they were measured on their machine"
+    with (
+        results.beside(store, parts, machine, scale=not as_measured)
+        if store is not None
+        else results.alone(parts)
+    ) as found_beside:
+        yield found_beside.path, f"{found_beside}{scaled}"
+
+
+def parts_of(beside: Sequence[str]) -> list[Path]:
+    """The files that --with names. ShardError if no runs are published here."""
     from fclib import results
 
     parts: list[Path] = []
@@ -56,9 +67,7 @@ def joined(
         if not found:
             raise results.ShardError("no runs are published here: pip install fclib-results")
         parts += found
-    with results.beside(store, parts, machine, scale=not as_measured) as found_beside:
-        scaled = "" if not as_measured else ", as they were measured on their machine"
-        yield found_beside.path, f"{found_beside}{scaled}"
+    return parts
 
 
 def print_profile(

@@ -27,12 +27,14 @@ from fclib.cli._output import (
     err,
     fail,
     interrupted,
+    load_modules,
     out,
     parse_options,
     progress_bar,
     usage_error,
     words_of,
 )
+from fclib.cli._profile import With, joined, parts_of, print_profile
 from fclib.cli._progress import duration, live
 from fclib.collections import library
 
@@ -77,7 +79,10 @@ def run(
     ] = None,
     solver: Annotated[
         list[str] | None,
-        typer.Option(help='A solver: "nsgs relaxation=1.2"; besides those of a campaign.'),
+        typer.Option(
+            help='A solver: "nsgs relaxation=1.2"; or a file of Python, for all solvers in it.'
+            " Besides those of a campaign."
+        ),
     ] = None,
     tol: Annotated[list[float] | None, typer.Option(help="Tolerances.")] = None,
     time_limit: Annotated[
@@ -112,6 +117,7 @@ def run(
             min=0,
         ),
     ] = RETRIES,
+    beside: With = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Run on the Dask cluster of this address.")
     ] = None,
@@ -143,6 +149,14 @@ def run(
     if calibrate:
         calibrate_here(as_json)
         return
+    if beside:
+        if not solver:
+            raise typer.BadParameter("--with takes the runs of a campaign's solvers: name --solver")
+        try:
+            parts_of(beside)
+        except fclib.Error as error:
+            fail(str(error))
+    solver, module = with_files(solver or [], module or [])
     flags: dict[str, Any] = {
         "tolerances": tol,
         "time_limit": time_limit,
@@ -160,7 +174,10 @@ def run(
                 raise bench.CampaignError("a campaign names its own problems")
             # the folder in which published campaigns find their problems
             os.environ.setdefault(library.FOLDER, str(library.default_folder()))
-            chosen = bench.Campaign.read(campaign, flags, sample, solver or ())
+            # with published runs, those of the campaign's own solvers need not be made
+            own = {"solvers": list(solver)} if beside else {}
+            added = () if beside else solver
+            chosen = bench.Campaign.read(campaign, {**flags, **own}, sample, added)
         else:
             if not problems or not solver:
                 raise bench.CampaignError("name a campaign, or give --problems and --solver")
@@ -230,7 +247,8 @@ def run(
     report.add(record)
     if not as_json:
         out.print(Rows([record]))
-        out.print(f"fclib profile {path}", highlight=False)
+        if not beside:
+            out.print(f"fclib profile {path}", highlight=False)
     if progress.not_run:
         causes = ", ".join(f"{n} {name}" for name, n in progress.not_run.most_common())
         tell(
@@ -239,6 +257,29 @@ def run(
         )
     if progress.stopped:
         fail(progress.stopped)
+    if beside:
+        try:
+            with joined(path, beside, None, as_measured=False) as (whole, note):
+                print_profile(whole, None, note=note, own_set=True, as_json=as_json)
+        except (ImportError, ValueError) as error:
+            fail(str(error))
+
+
+def with_files(solvers: list[str], modules: list[str]) -> tuple[list[str], list[str]]:
+    """The solvers, with those of a file in place of its name; and the files to be imported."""
+    found: list[str] = []
+    for text in solvers:
+        if not (text.endswith(".py") and Path(text).is_file()):
+            found.append(text)
+            continue
+        path = Path(text).resolve()
+        load_modules([path])
+        own = [info.name for info in fclib.solvers() if info.origin == path.stem]
+        if not own:
+            raise typer.BadParameter(f"{text}: has no solver (@fclib.solver)")
+        found += own
+        modules = [*modules, str(path)]
+    return found, modules
 
 
 def group_problems(problems: list[str], sample: int | None) -> list[dict[str, Any]]:

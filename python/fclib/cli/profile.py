@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -145,7 +146,8 @@ def command(
         "weigh": weigh.value,
     }
     try:
-        with joined(store, beside, machine, as_measured) as (whole, note):
+        own = nullcontext((store, ""))
+        with joined(store, beside, machine, as_measured) if beside else own as (whole, note):
             if figure:
                 from fclib.report import write_figure
 

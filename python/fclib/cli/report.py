@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 import fclib
 from fclib.cli._output import MeritKind, err, fail, out
+from fclib.cli._profile import With, joined
 
 
 @contextmanager
@@ -34,8 +35,10 @@ def command(
         list[Path] | None, typer.Argument(help="Stores of `fclib bench`.", show_default=False)
     ] = None,
     catalogue: Annotated[
-        Path | None, typer.Option("--catalog", help="Folder of a collection.")
+        Path | None,
+        typer.Option("--catalog", help="Folder of a collection; tiny: the set in the package."),
     ] = None,
+    beside: With = None,
     folder: Annotated[
         Path, typer.Option("--out", help="Folder of the site, or of the figures.")
     ] = (Path("site")),
@@ -79,19 +82,23 @@ def command(
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the site.")] = "",
 ) -> None:
-    """Make a site to browse from stores and a catalogue.
+    """Make a site to browse from stores, published runs and a catalogue.
 
     Open its index.html. Only pages that check and solve problems (--with-files) need a server:
     --serve. Without stores and catalogue, --serve serves a site that is there already.
     """
     if serve and pdf:
         raise typer.BadParameter("--serve serves a site, and --pdf makes none")
-    alone = serve and not (stores or catalogue)
-    if not (stores or alone) and (pdf or catalogue is None):
+    alone = serve and not (stores or beside or catalogue)
+    if not (stores or beside or alone) and (pdf or catalogue is None):
         raise typer.BadParameter("name stores, a catalogue by --catalog, or both")
+    if beside and len(stores or ()) > 1:
+        raise typer.BadParameter(
+            "--with goes with one store: fclib bench merge makes one of several"
+        )
     try:
         from fclib import report
-        from fclib.collections import CatalogError
+        from fclib.collections import CatalogError, set_index
     except ImportError as error:
         fail(f'{error}; pip install "fclib[report]"')
     try:
@@ -100,10 +107,19 @@ def command(
             return
         with ExitStack() as stack:
             campaigns = None
+            note = ""
+            if beside:
+                own = stores[0] if stores else None
+                whole, note = stack.enter_context(joined(own, beside, machine, as_measured=False))
+                stores = [whole]
             if stores:
                 campaigns = stack.enter_context(
-                    report.Campaigns(stores, machine, campaign, merit.value if merit else None)
+                    report.Campaigns(
+                        stores, machine, campaign, merit.value if merit else None, note
+                    )
                 )
+            if str(catalogue) in set_index.SHIPPED:
+                catalogue = set_index.DATA
             if pdf:
                 assert campaigns is not None
                 for path in report.write_paper(campaigns, folder):

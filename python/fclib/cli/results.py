@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ from fclib import bench, results
 from fclib.bench.calibration import calibration_in
 from fclib.cli._output import Json, Report, Rows, err, fail, out, words_of
 
-app = typer.Typer(help="Published runs: list, show, verify; pack your own.", no_args_is_help=True)
+app = typer.Typer(help="Published runs: list, show, verify; submit your own.", no_args_is_help=True)
 
 Where = Annotated[
     Path | None,
@@ -79,11 +80,28 @@ def show(where: Where = None, as_json: Json = False) -> None:
 
 
 @app.command()
+def leaders(where: Where = None, as_json: Json = False) -> None:
+    """Show the solvers of each set in their order, with version, machine and date."""
+    report = Report(as_json)
+    try:
+        for row in results.leaders(parts_of(where)):
+            report.add(row)
+    except (ImportError, fclib.Error) as error:
+        fail(str(error))
+    if not as_json:
+        out.print(Rows(report.records) if report.records else "no runs are published here")
+
+
+@app.command()
 def verify(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Parts; by default all of the folder.")
     ] = None,
     where: Where = None,
+    problems: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder of a collection: the solutions of the parts are judged again."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Check the parts: their names against their contents, and each row against itself."""
@@ -92,11 +110,23 @@ def verify(
     if not paths:
         fail("there is no part to check")
     for path in paths:
+        record: dict[str, Any] = {"part": str(path)}
         try:
             wrong = results.verify(path)
+            if problems:
+                verdicts = results.judged(path, problems)
+                counts = Counter(row["status"] for row in verdicts)
+                record |= {"solutions judged": counts["ok"] + counts["wrong"]}
+                record |= {"without a problem": counts["no problem"]}
+                wrong += [
+                    f"{row['problem']} by {row['solver']} to {row['tol']:g}: the error is"
+                    f" {row['error']:.3g}, and the part says {row['said']:.3g}"
+                    for row in verdicts
+                    if row["status"] == "wrong"
+                ]
         except (ImportError, fclib.Error) as error:
             wrong = [str(error)]
-        report.add({"part": str(path), "status": "wrong" if wrong else "ok"}, not wrong)
+        report.add({**record, "status": "wrong" if wrong else "ok"}, not wrong)
         for word in wrong[:10]:
             err.print(f"fclib: {path}: {word}", style="red", highlight=False)
         if len(wrong) > 10:
@@ -135,3 +165,27 @@ def pack(
             highlight=False,
         )
     out.print(str(path) if path else "there is no new run", highlight=False)
+
+
+@app.command()
+def submit(
+    store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
+    name: Annotated[str, typer.Option(help='Set of the runs, as "standard".')],
+    where: Annotated[Path, typer.Option("--out", help="Folder of the file.")] = Path(),
+    machine: Annotated[
+        str, typer.Option(help="Name of the machine; by default the model of its processor.")
+    ] = "",
+) -> None:
+    """Write all runs of a store as one file, with the solutions of a sample, to hand them in.
+
+    `fclib results verify FILE --problems FOLDER` judges these solutions again. CONTRIBUTING.md says
+    what happens then.
+    """
+    try:
+        with bench.Store(store, create=False) as opened:
+            path = results.submit(opened, where, name, machine)
+    except (ImportError, fclib.Error) as error:
+        fail(str(error))
+    except OSError as error:
+        fail(words_of(error))
+    out.print(str(path), highlight=False)

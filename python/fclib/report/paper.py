@@ -37,7 +37,7 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
         costs = whole.at(tol)
         own = folder / f"tol-{tol:g}"
         own.mkdir(parents=True, exist_ok=True)
-        words = profiles.caption(costs, campaigns.at(tol), WEIGH)
+        words = campaigns.caption(costs, campaigns.at(tol))
         plots.performance(costs, own, FORMATS, words, weigh=WEIGH)
         plots.data(costs, own, FORMATS, per_contact=False, caption=words, weigh=WEIGH)
         plots.data(costs, own, FORMATS, per_contact=True, caption=words, weigh=WEIGH)
@@ -47,7 +47,7 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
         written |= set(own.iterdir())
     if len(whole.tolerances) > 1:
         points = profiles.work_precision(campaigns.rows, whole, weigh=WEIGH)
-        words = profiles.caption(whole, campaigns.rows, WEIGH)
+        words = campaigns.caption(whole, campaigns.rows)
         plots.work_precision(points, metric, folder, FORMATS, words)
         written.add(folder / f"work-precision-{metric}.pdf")
     return sorted(written)

@@ -60,6 +60,7 @@ class Campaigns:
         machine: str | None = None,
         campaign: str | None = None,
         merit: MeritKind | None = None,
+        note: str = "",
     ) -> None:
         """Read them.
 
@@ -68,11 +69,13 @@ class Campaigns:
             machine: only the runs of this node.
             campaign: only the runs of this campaign.
             merit: only the runs whose tolerance bounds this merit.
+            note: on published runs among them, for the captions.
 
         Raises:
             StoreError: a file is not a store.
             ProfileError: no run is left, or they are of several machines or merits.
         """
+        self.note = note
         self._folder = tempfile.TemporaryDirectory(prefix="fclib-report-")
         try:
             self.store = self._merged(stores)
@@ -190,6 +193,11 @@ class Campaigns:
         none = np.full(len(found.instances), NOT_RUN)
         return tuple("".join(columns.get(name, none)) for name in self.solvers)
 
+    def caption(self, costs: Costs, runs: Table) -> str:
+        """What a figure of some runs shows."""
+        words = profiles.caption(costs, runs, WEIGH)
+        return f"{words}; {self.note}" if self.note else words
+
     def headline(self, tol: float, places: Mapping[str, int]) -> dict[str, Any] | None:
         """Curves, tables and extremes at a tolerance.
 
@@ -218,7 +226,7 @@ class Campaigns:
         curves = profiles.share_within(quotients, taus, costs.weights(WEIGH))
         return found | {
             "instances": len(costs.instances),
-            "caption": profiles.caption(costs, self.at(tol), WEIGH),
+            "caption": self.caption(costs, self.at(tol)),
             "not_compared": profiles.left_out(self.every.at(tol), costs),
             "solvers": list(costs.solvers),
             "legend": [costs.legend(k) for k in range(len(costs.solvers))],

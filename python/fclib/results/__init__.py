@@ -4,23 +4,31 @@
 
 shards.py       a part: from a store, back into one, and checked
 beside.py       published runs beside those of a store, on the scale of its machine
+submission.py   a part that somebody submits, with solutions that are judged again
+leaders.py      the solvers of each set in their order
 
 The parts lie in the package `fclib-results`, installed beside this one, or in `results/` of a
 checkout.
 """
 
-from fclib.results.beside import BesideError, Joined, beside
+from fclib.results.beside import BesideError, Joined, alone, beside
+from fclib.results.leaders import leaders
 from fclib.results.shards import Shard, ShardError, folder, pack, rows_of, shards, verify
+from fclib.results.submission import judged, submit
 
 __all__ = [
     "BesideError",
     "Joined",
     "Shard",
     "ShardError",
+    "alone",
     "beside",
     "folder",
+    "judged",
+    "leaders",
     "pack",
     "rows_of",
     "shards",
+    "submit",
     "verify",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from fclib.bench.calibration import Calibration, Ratio, calibration_in, ratio_of
 from fclib.bench.store import Store
 from fclib.results.shards import ShardError, look, rows_of
 
+NONE = (math.inf, math.inf)  # the limits of a kind of runs that a store lacks
 TIMES = ("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s")
 REMEDY = "calibrate this machine with `fclib bench --calibrate`, before the campaign"
 
@@ -32,7 +35,7 @@ class Joined:
 
     def __str__(self) -> str:
         words = [f"times of {node} x {ratio}" for node, ratio in self.ratios.items()]
-        return f"{self.runs} published runs; {'; '.join(words) or 'of this machine'}"
+        return f"{self.runs} published runs; {'; '.join(words) or 'times as measured'}"
 
 
 @contextmanager
@@ -41,9 +44,10 @@ def beside(
 ) -> Iterator[Joined]:
     """A temporary store with the runs of a store, and the published ones of the same problems.
 
-    The published runs of a problem at a tolerance, under a limit, are taken if the store has a run
-    of this kind. A time on another machine becomes the time on this one: it is multiplied by the
-    ratio of the two calibrations. A run that would take longer than its limit here has failed.
+    The published runs of a problem at a tolerance are taken if the store has such a run, and its
+    limit is no larger than theirs. A time on another machine becomes the time on this one: it is
+    multiplied by the ratio of the two calibrations. The limit is that of the store: a run that
+    would take longer here has failed.
 
     Args:
         mine: the store.
@@ -60,38 +64,71 @@ def beside(
         with Store(path) as joined:
             joined.merge([mine])
             own = joined.machines()
-            wanted, node, facts = _wanted(joined, own, machine, mine)
+            limits, node, facts = _wanted(joined, own, machine, mine)
             here = calibration_in(facts)
             ratios: dict[str, Ratio] = {}
             taken = 0
             for part in parts:
                 machines = look(part).machines
                 if scale:
-                    ratios |= _ratios(here, machines, facts, part)
+                    ratios |= _ratios(here, machines, part)
                 rows = (
-                    _scaled(row, ratios.get(row["node"]), node)
+                    _scaled(row, ratios.get(row["node"]), node, limits[kind_of(row)])
                     for row in rows_of(part)
-                    if kind_of(row) in wanted
+                    if row["time_limit"] >= limits.get(kind_of(row), NONE)[0]
                 )
                 taken += joined.add_rows(rows, {node: facts})
         if not taken:
             raise BesideError(
-                f"{mine}: there is no published run of its problems, tolerances and limits that it"
-                " does not have itself"
+                f"{mine}: there is no published run of its problems at its tolerances, under its"
+                " limits or larger ones, that it does not have itself"
             )
         yield Joined(path, taken, {k: v for k, v in ratios.items() if v.mean != 1})
 
 
+@contextmanager
+def alone(parts: Iterable[Path]) -> Iterator[Joined]:
+    """A temporary store with all published runs, their times on the scale of one machine.
+
+    This machine is the one with most runs, and its name is that of the first of the parts on ties.
+
+    Raises:
+        BesideError: there are several machines, and one of them was not calibrated.
+        ShardError: a part cannot be read, or there is none.
+    """
+    found = [look(part) for part in parts]
+    if not any(one.runs for one in found):
+        raise ShardError("no runs are published here: pip install fclib-results")
+    machines = {name: facts for one in found for name, facts in one.machines.items()}
+    counts = Counter(row["node"] for one in found for row in rows_of(one.path, ("node",)))
+    (node, _), *_ = counts.most_common(1)
+    facts = machines[node]
+    ratios: dict[str, Ratio] = {}
+    for one in found:
+        others = {name: own for name, own in one.machines.items() if name != node}
+        ratios |= _ratios(calibration_in(facts), others, one.path)
+    with TemporaryDirectory(prefix="fclib-results-") as temporary:
+        path = Path(temporary) / "published.sqlite"
+        with Store(path) as joined:
+            rows = (
+                _scaled(row, ratios.get(row["node"]), node, (row["time_limit"], row["wall_limit"]))
+                for one in found
+                for row in rows_of(one.path)
+            )
+            taken = joined.add_rows(rows, {node: facts})
+        yield Joined(path, taken, ratios)
+
+
 def kind_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
     """What two runs have in common that may be compared."""
-    names = ("hash", "tol", "merit", "time_limit", "start", "sequence", "step", "threads")
+    names = ("hash", "tol", "merit", "start", "sequence", "step", "threads")
     return tuple(row[name] for name in names)
 
 
 def _wanted(
     store: Store, machines: Mapping[str, Mapping[str, Any]], machine: str | None, mine: Path
-) -> tuple[set[tuple[Any, ...]], str, Mapping[str, Any]]:
-    """The kinds of the runs of a machine, its node, and its facts."""
+) -> tuple[dict[tuple[Any, ...], tuple[float, float]], str, Mapping[str, Any]]:
+    """The limits of the runs of a machine by their kinds, its node, and its facts."""
     runs = list(store.table())
     nodes = sorted({str(row["node"]) for row in runs})
     node = machine or (nodes[0] if len(nodes) == 1 else "")
@@ -102,13 +139,16 @@ def _wanted(
     known = [machines[row["machine"]] for row in own]
     # a machine that was calibrated later is the same machine
     facts = next((one for one in reversed(known) if calibration_in(one)), known[0])
-    return {kind_of(row) for row in own}, node, facts
+    limits: dict[tuple[Any, ...], tuple[float, float]] = {}
+    for row in own:  # the largest, as in a comparison
+        found = row["time_limit"], row["wall_limit"]
+        limits[kind_of(row)] = max(found, limits.get(kind_of(row), found))
+    return limits, node, facts
 
 
 def _ratios(
     here: Calibration | None,
     machines: Mapping[str, Mapping[str, Any]],
-    facts: Mapping[str, Any],
     part: Path,
 ) -> dict[str, Ratio]:
     """The factor of the times of each machine of a part."""
@@ -116,7 +156,7 @@ def _ratios(
     for name, theirs in machines.items():
         other = calibration_in(theirs)
         if here is None:
-            raise BesideError(f"the machine of the store was not calibrated: {REMEDY}")
+            raise BesideError(f"the machine of the runs was not calibrated: {REMEDY}")
         if other is None:
             raise ShardError(f"{part}: the machine {name} was not calibrated")
         try:
@@ -126,11 +166,13 @@ def _ratios(
     return found
 
 
-def _scaled(row: Mapping[str, Any], ratio: Ratio | None, node: str) -> dict[str, Any]:
-    """A published run as one of this machine."""
+def _scaled(
+    row: Mapping[str, Any], ratio: Ratio | None, node: str, limits: tuple[float, float]
+) -> dict[str, Any]:
+    """A published run as one of this machine, under limits of CPU time and of the clock [s]."""
     factor = 1.0 if ratio is None else ratio.mean
     times = {name: None if row[name] is None else factor * row[name] for name in TIMES}
-    here = {**row, **times, "node": node}
-    if row["solved"] and (here["cpu_s"] or 0.0) > row["time_limit"]:
+    here = {**row, **times, "node": node, "time_limit": limits[0], "wall_limit": limits[1]}
+    if row["solved"] and (here["cpu_s"] or 0.0) > limits[0]:
         return here | {"status": "time_limit", "solved": 0}
     return here

@@ -1,8 +1,9 @@
 """A part of the published runs: a file that is written once, and named by its content.
 
 It is a Parquet file with a row for each run and the columns of a store's `results`, so that any
-program reads it. Paths of the machine, and solutions, stay out of it. Its metadata have the facts
-of the machines, with their calibrations, and the names of the campaigns.
+program reads it. Paths of the machine stay out of it. Its metadata have the facts of the machines,
+with their calibrations, and the names of the campaigns. A part that somebody submits also has the
+solutions of a sample: the columns of `VECTORS`, doubles in little endian.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, Final
+
+import numpy as np
 
 from fclib import _core
 from fclib._verdicts import is_solved
@@ -34,6 +37,11 @@ NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 NEEDED: Final = ("key", "problem", "hash", "solver", "tol", "merit", "status", "solved", "node")
 PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
 LEFT: Final = ("run", "campaign", "machine", "message")  # mean nothing elsewhere, or name paths
+REPORTS: Final = (
+    32  # reports of a run that are published, evenly over the logarithm of their number
+)
+VECTORS: Final = ("r", "l")  # columns of a part with solutions: reactions, multipliers
+SAMPLE: Final = 50  # solutions in a part at most, evenly spread
 # what may name a person's machine
 PRIVATE: Final = ("node", "system")
 
@@ -137,6 +145,8 @@ def pack(
     name: str,
     machine: str = "",
     there: Iterable[Shard] = (),
+    *,
+    solutions: bool = False,
 ) -> Path | None:
     """Write the runs of a store that no part has yet as a new part.
 
@@ -147,6 +157,7 @@ def pack(
         machine: the name under which the machine is published; its host name stays private. By
             default the model of its processor.
         there: parts whose runs are not packed again.
+        solutions: whether it has the solutions of a sample, as far as the store has them.
 
     Returns:
         The file; None if there is no new run.
@@ -171,16 +182,19 @@ def pack(
     public = {key: machine or str(facts.get("cpu") or "?") for key, facts in own.items()}
     kinds = store.kinds()
     rows = []
+    kept = sampled(store) if solutions else set()
     for row in store.table(more=LONG):
         label = public[row["machine"]]
         if (row["key"], label) in known:
             continue
-        history = [dict(zip(HISTORY, report, strict=True)) for report in store.history(row["run"])]
+        vectors = store.solution(row["run"]) if row["run"] in kept else {}
+        history = thinned(store.history(row["run"]))
         mine = {key: value for key, value in row.items() if key not in LEFT}
         rows.append(
             mine
             | {"solver_name": public_name(str(row["solver_name"]))}
             | {"node": label, "kind": kinds.get(row["hash"], ""), "history": history or None}
+            | {name: vectors[name].astype("<f8").tobytes() for name in VECTORS if name in vectors}
         )
     if not rows:
         return None
@@ -194,13 +208,35 @@ def pack(
     ]
     about = {"version": VERSION, "machines": machines, "campaigns": campaigns}
     metadata = {ABOUT: json.dumps(about, sort_keys=True)}
-    table = pa.Table.from_pylist(rows, schema=pa.schema(list(types().items()), metadata=metadata))
+    columns = types() | (dict.fromkeys(VECTORS, pa.binary()) if solutions else {})
+    table = pa.Table.from_pylist(rows, schema=pa.schema(list(columns.items()), metadata=metadata))
     where.mkdir(parents=True, exist_ok=True)
     part = where / f".{name}.part"
     replace_file(part, lambda beside: pa.parquet.write_table(table, beside, compression="zstd"))
     path = where / f"{name}-{sha256(part)[:DIGITS]}.parquet"
     part.replace(path)
     return path
+
+
+def thinned(history: Sequence[Sequence[Any]]) -> list[dict[str, Any]]:
+    """Some reports of a run, with the last one; numbers in single precision, which is smaller."""
+    count = len(history)
+    spaced = np.geomspace(1, max(1, count), REPORTS).round().astype(int) - 1
+    chosen = range(count) if count <= REPORTS else sorted({0, count - 1, *spaced.tolist()})
+    return [
+        {
+            name: float(np.float32(value)) if isinstance(value, float) else value
+            for name, value in zip(HISTORY, history[k], strict=True)
+        }
+        for k in chosen
+    ]
+
+
+def sampled(store: Store) -> set[int]:
+    """The numbers of some runs whose solutions are stored, evenly spread over the store."""
+    there = store.with_solutions()
+    count = min(SAMPLE, len(there))
+    return {there[k * len(there) // count] for k in range(count)}
 
 
 def rows_of(path: Path, chosen: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:

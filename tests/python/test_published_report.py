@@ -1,0 +1,145 @@
+"""The readable report of published runs, submissions, and the leaderboard."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import gzip
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from fclib import bench
+from fclib.cli import app
+
+pytest.importorskip("pyarrow")
+
+from fclib import results
+from workshop.tables import _results, published
+
+PLAN = {
+    "name": "small",
+    "solvers": ["nsgs", "apgd", "nsn-ac"],
+    "tolerances": [1e-8],
+    "from_history": [1e-4],
+    "repeats": 2,
+    "repeated": 0.7,
+    "renumber": True,
+    "problems": [{"planted": {"count": 8, "contacts": 4, "seed": 1}, "family": "Chain"}],
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The store of a campaign, beside the folder of its problems."""
+    folder = tmp_path_factory.mktemp("published")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FCLIB_CACHE", str(folder / "cache"))
+        bench.run_campaign(bench.Campaign.of(PLAN), folder / "small.sqlite")
+    return folder
+
+
+def said(*words: object, code: int = 0) -> str:
+    done = CliRunner().invoke(app, [str(word) for word in words])
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+def test_a_submission_is_judged_again(run: Path, tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    store = run / "small.sqlite"
+    part = Path(said("results", "submit", store, "--name", "small", "--out", tmp_path).strip())
+    assert results.verify(part) == []
+    verdicts = results.judged(part, [run / "cache"])
+    assert Counter(row["status"] for row in verdicts) == {"ok": 18}  # three solvers, six problems
+    assert "ok" in said("results", "verify", part, "--problems", run / "cache")
+    missing = said("results", "verify", part, "--problems", tmp_path, "--json")
+    assert json.loads(missing)["without a problem"] == 18
+    # whoever claims a solution that is none is found
+    table = pq.read_table(part)
+    rows = table.to_pylist()
+    own = next(row for row in rows if row["r"])
+    own["r"] = bytes(len(own["r"]))
+    pq.write_table(type(table).from_pylist(rows, schema=table.schema), part)
+    assert [row["status"] for row in results.judged(part, [run])].count("wrong") == 1
+    said("results", "verify", part, "--problems", run / "cache", code=1)
+    # a plain part has none
+    with bench.Store(store) as opened:
+        plain = results.pack(opened, tmp_path / "parts", "small")
+    assert plain is not None
+    with pytest.raises(results.ShardError, match="no solution"):
+        results.judged(plain, [run])
+
+
+def test_the_leaders_of_a_set(run: Path, tmp_path: Path) -> None:
+    with bench.Store(run / "small.sqlite") as opened:
+        results.pack(opened, tmp_path, "small", "fast")
+    rows = results.leaders(results.shards(tmp_path))
+    assert {(row["set"], row["tol"], row["solver"]) for row in rows} == {
+        ("small", tol, solver) for tol in (1e-4, 1e-8) for solver in ("nsgs", "apgd", "nsn-ac")
+    }
+    for row in rows:
+        assert (row["of"], row["machine"]) == (8, "fast")
+        assert row["version"].startswith("1.")
+    shares = [row["share"] for row in rows if row["tol"] == 1e-8]
+    assert shares == sorted(shares, reverse=True)
+    assert "nsn-ac" in said("results", "leaders", "--in", tmp_path)
+
+
+def test_the_page_is_made_of_parts(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that the page quotes is there; the curves of a paper stand beside ours."""
+    with bench.Store(run / "small.sqlite") as opened:
+        results.pack(opened, tmp_path / "parts", "faf2018", "fast")
+    curves = tmp_path / "curves.csv"
+    curves.write_text(
+        "set,tolerance,limit_s,solver,tau,share\n"
+        + "".join(
+            f"Chain,1e-8,50,{solver},{tau},1\n" for solver in ("nsgs", "apgd") for tau in (1, 9)
+        )
+    )
+    (tmp_path / "images").mkdir()
+    page = tmp_path / "published-results.md"
+    monkeypatch.setattr(_results, "FOLDER", tmp_path / "results")
+    monkeypatch.setattr(published, "IMAGES", tmp_path / "images")
+    monkeypatch.setattr(published, "PAGE", page)
+    words = ["published", "--parts", str(tmp_path / "parts"), "--paper", str(curves)]
+    monkeypatch.setattr("sys.argv", words)
+    published.main()
+    text = page.read_text()
+    quoted = {path.stem for path in (tmp_path / "results").glob("*.csv")}
+    assert all(f"(results/{name}.csv)" in text for name in quoted)
+    assert {"published-parts", "published-noise", "published-best"} <= quoted
+    for path in (tmp_path / "images").glob("*.png"):
+        assert f"images/{path.name}" in text
+    with (tmp_path / "results" / "published-2018.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    # the paper's curves are 1 everywhere, and no two solvers are the fastest on all problems
+    assert {row["set"] for row in rows} == {"Chain"}
+    assert max(float(row["largest distance"]) for row in rows) > 0
+    with (tmp_path / "results" / "published-parts.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert (row["runs"], row["read off histories"], row["problems"]) == ("84", "42", "8")
+
+
+def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:
+    """No store, no catalogue: the parts are enough, and the captions say whose times they are."""
+    pytest.importorskip("itables")
+    with bench.Store(run / "small.sqlite") as opened:
+        part = results.pack(opened, tmp_path / "parts", "small", "fast")
+    out = tmp_path / "site"
+    assert "84 runs" in said("report", "--with", part, "--out", out, "--views", "0", "--jobs", "1")
+    packed = [path.read_text().split('"') for path in (out / "data").glob("*.js")]
+    content = [
+        gzip.decompress(base64.b64decode(p[3])).decode()
+        for p in packed
+        if p[3:] and p[3].startswith("H4s")
+    ]
+    assert any("84 published runs; times as measured" in text for text in content)
+    stores = [run / "small.sqlite"] * 2
+    said("report", *stores, "--with", part, "--out", out, code=2)

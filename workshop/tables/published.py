@@ -1,0 +1,712 @@
+"""The readable report of the published runs: its tables, its pictures and its page.
+
+    python -m workshop.tables.published
+    python -m workshop.tables.published --paper CURVES.csv --catalog FOLDER
+
+It runs nothing. It reads the parts in results/ and writes docs/results/published-*.csv,
+docs/images/published-*.png and docs/published-results.md, which quotes them. A set is the name of
+its parts. What nothing is published of is left out.
+
+--paper has the curves of the comparison of 2018, as they were read from its figures: set,
+tolerance, limit_s, solver, tau, share. They are quoted beside ours, set by set. --catalog is a
+built collection (`fclib collection build ... --analyze`): it has the ranks and the conditioning.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import textwrap
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+
+from fclib import collections, results, scenes
+from fclib._verdicts import is_solved
+from fclib.bench import comparison, plots, profiles
+from fclib.bench.calibration import calibration_in
+from fclib.bench.comparison import Array, Costs, odds, words_in
+from fclib.bench.table import Table
+from workshop.tables import _results
+
+Row: TypeAlias = dict[str, Any]
+
+WEIGH: Final[profiles.Weigh] = "families"
+DRAWN: Final = 10  # solvers in a picture
+PAGE: Final = _results.ROOT / "docs" / "published-results.md"
+IMAGES: Final = _results.ROOT / "docs" / "images"
+SEQUENCES: Final = "sequences"  # the set whose runs are along sequences
+PAPER: Final = "faf2018"  # the set of the comparison of 2018
+# families as the campaign calls them, and as the curves of the paper do
+SETS: Final = {"Aqueduct_PR": "AqueducPR", "BoxesStack": "BoxesStack1"}
+# solvers of the paper, and Siconos' own implementation of the same method
+OWN: Final = {
+    "NSGS-AC": "siconos:nsgs",
+    "NSGS-FP-VI-UPK tol 1e-14": "siconos:nsgs-projection",
+    "EG-VI-UPK": "siconos:vi-eg",
+    "NSN-AC": "siconos:nsn-ac",
+    "PPA-NSN-AC-GP adaptive": "siconos:prox",
+    "TRESCA-NSGS-FP-VI-UPK": "siconos:tfp",
+    "ACLM-NSGS-FP-VI": "siconos:aclmfp",
+}
+BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
+# facts of a problem whose effect is asked for: the column, and its words
+EFFECTS: Final = {
+    "nc": "contacts",
+    "density": "contact components for a degree of freedom",
+    "rank ratio": "rank of W over its size",
+    "conditioning_W": "conditioning of W",
+}
+
+
+@dataclass(frozen=True)
+class Set:
+    """The published runs of a set."""
+
+    name: str
+    parts: Sequence[results.Shard]
+    rows: Table  # cold runs
+    every: Costs
+    costs: Costs  # on the set that is compared
+    caption: str  # on machines
+
+    @property
+    def tolerances(self) -> list[float]:
+        """The tolerances, the largest first."""
+        return self.costs.tolerances
+
+
+def main() -> None:
+    """Write the report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--parts", type=Path, help="folder of the parts")
+    parser.add_argument("--paper", type=Path, help="curves of the comparison of 2018")
+    parser.add_argument("--catalog", type=Path, help="a built collection, with ranks")
+    own = parser.parse_args()
+    folder = own.parts or results.folder()
+    parts = results.shards(folder) if folder else []
+    if not parts:
+        raise SystemExit("no runs are published here")
+    groups: dict[str, list[results.Shard]] = defaultdict(list)
+    for part in parts:
+        groups[part.name].append(part)
+    facts = facts_of(own.catalog) if own.catalog else {}
+    page: list[str] = []
+    with ExitStack() as stack:
+        sets = []
+        for name, shards in sorted(groups.items()):
+            joined = stack.enter_context(results.alone([shard.path for shard in shards]))
+            if name == SEQUENCES:
+                rows = profiles.load(joined.path, start=None)
+                page += table("published-warm", warm(joined.path, rows), "Warm against cold", "")
+                continue
+            sets.append(set_of(name, shards, joined))
+        page = [*of_sets(sets, groups, facts), *(["## Warm or cold?", "", *page] if page else [])]
+        if own.paper:
+            page += [part for one in sets if one.name == PAPER for part in of_paper(one, own.paper)]
+    PAGE.write_text("\n".join([*HEAD, *page]).rstrip() + "\n", encoding="utf-8")
+    print(PAGE)
+
+
+def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set:
+    """The runs of a set, gathered."""
+    rows = profiles.load(joined.path)
+    every = profiles.gather(rows)
+    return Set(name, shards, rows, every, comparison.compared(every), str(joined))
+
+
+def prose(words: str) -> list[str]:
+    """A paragraph of the page."""
+    return [*textwrap.wrap(words, 118), ""]
+
+
+HEAD: Final = [
+    "# What the published runs say",
+    "",
+    "<!-- made by: python -m workshop.tables.published -->",
+    "",
+    *prose(
+        "This page is made by one command from the [published runs](published-runs.md). Nobody has"
+        " typed a figure of it. [What is measured](measurement.md) says what the words mean: an"
+        " instance, solved, the common set, the shifted mean."
+    ),
+]
+
+
+def of_sets(
+    sets: Sequence[Set], groups: Mapping[str, Sequence[results.Shard]], facts: Mapping[str, Row]
+) -> Iterator[str]:
+    """The parts of the page on sets."""
+    yield from ("## What was run?", "")
+    yield from prose(
+        "`planned` are the runs of the whole campaign. Less was run where `runs` is smaller: "
+        "the order of a campaign makes any part of it balanced over the families. `load` is "
+        "the load of the machine as a run began; above the number of cores, times are longer "
+        "than on a quiet machine."
+    )
+    yield from table("published-parts", [part_row(n, own) for n, own in groups.items()],
+                     "Published runs", "")  # fmt: skip
+    noise = [row for one in sets for row in noise_rows(one)]
+    if noise:
+        yield from ("## How much is noise?", "")
+        yield from prose(
+            "A tenth of the problems is solved three times, in another order, and on "
+            "renumbered copies. The table has by how much the slowest of the copies takes "
+            "longer than the fastest."
+        )
+        yield from table("published-noise", noise, "The spread of repeats", "")
+    yield from ("## Who solves how much, and how fast?", "")
+    yield from table("published-solvers", [row for one in sets for row in solver_rows(one)],
+                     "The solvers", "; ".join(caption_of(one) for one in sets) + ".")  # fmt: skip
+    for one in sets:
+        yield from pictures(one)
+    failures = [row for one in sets for row in failure_rows(one)]
+    if failures:
+        yield from ("## Who fails where, and why?", "")
+        yield from table("published-failures", failures, "What ends the runs that fail",
+                         "Each solver on what it has run and takes.")  # fmt: skip
+    yield from ("## Which family of methods for which kind of problem?", "")
+    yield from table("published-kinds", [row for one in sets for row in kind_rows(one)],
+                     "The best of each family of methods, by kind of problem",
+                     "The best solver is the one that solves most, then the fastest.")  # fmt: skip
+    effects = [row for one in sets for row in effect_rows(one, facts)]
+    if effects:
+        yield from ("## What do size, density, rank and conditioning do?", "")
+        yield from prose(
+            "The problems of a set are halved at the median of the fact. `shift of the share` "
+            "is what the share of solved problems changes from the lower half to the upper "
+            "one; `exponent` is that of the CPU time of the solved ones, with the interval of "
+            "a bootstrap over problems."
+        )
+        yield from table(
+            "published-effects", effects, "The effect of a fact on a family of methods", ""
+        )
+    yield from ("## What would the best of all be?", "")
+    yield from table("published-best", [row for one in sets for row in best_rows(one)],
+                     "The virtual best, and the best two and three solvers together",
+                     "Chosen in hindsight: nobody knows it before.")  # fmt: skip
+    yield from ("## What follows?", "")
+    yield from prose(
+        "A statement is carried by the data if its 95 % interval lies on one side of the bound."
+    )
+    yield from table("published-conclusions", [row for one in sets for row in conclusions(one)],
+                     "Statements, and whether the data carry them", "")  # fmt: skip
+
+
+def caption_of(one: Set) -> str:
+    """What the runs of a set are."""
+    return f"{one.name}: {profiles.caption(one.costs, one.rows, WEIGH)}; {one.caption}"
+
+
+def table(name: str, rows: Sequence[Row], title: str, note: str) -> list[str]:
+    """Store a table, and the line of the page that quotes it; nothing if it has no row."""
+    if not rows:
+        return []
+    _results.store(name, rows, title=title, note=note)
+    return [f"[Table: {title}](results/{name}.csv)", ""]
+
+
+# ---- what was run
+
+
+def part_row(name: str, parts: Sequence[results.Shard]) -> Row:
+    """A row on the parts of a set."""
+    names = ("hash", "solver", "cpu_s", "total_cpu_s", "load", "measured", "started", "node", "tol")
+    rows = [row for part in parts for row in results.rows_of(part.path, names)]
+    loads = np.array([row["load"] for row in rows if row["load"] is not None])
+    days = sorted(
+        time.strftime("%Y-%m-%d", time.gmtime(row["started"])) for row in rows if row["started"]
+    )
+    planned = max((int(c["planned"] or 0) for p in parts for c in p.campaigns), default=0)
+    spent = math.fsum(row["total_cpu_s"] or 0.0 for row in rows if row["measured"] != "history")
+    machines = {node: facts for part in parts for node, facts in part.machines.items()}
+    known = [calibration_in(facts) for facts in machines.values()]
+    return {
+        "set": name,
+        "runs": len(rows),
+        "planned": planned,
+        "read off histories": sum(row["measured"] == "history" for row in rows),
+        "problems": len({row["hash"] for row in rows}),
+        "solvers": len({row["solver"] for row in rows}),
+        "CPU [h]": spent / 3600,
+        "median load": float(np.median(loads)) if loads.size else "",
+        "largest load": float(loads.max()) if loads.size else "",
+        "machine": ", ".join(machines),
+        "spread of the calibration": ", ".join(f"{c.spread:.1%}" for c in known if c) or "none",
+        "dates": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "",
+    }
+
+
+def noise_rows(one: Set) -> list[Row]:
+    """By tolerance: the spread of copies, in the median and of nine in ten."""
+    found = []
+    for tol in one.every.tolerances:
+        part = one.every.at(tol)
+        assert part.copies is not None
+        own = part.copies[np.isfinite(part.copies)]
+        if own.size:
+            medium, most = np.quantile(own, (0.5, 0.9))
+            found.append(
+                {
+                    "set": one.name,
+                    "tolerance": _results.power(tol),
+                    "pairs of solver and problem": own.size,
+                    "spread of half": f"{100 * medium:.0f} %",
+                    "spread of nine in ten": f"{100 * most:.0f} %",
+                }
+            )
+    return found
+
+
+# ---- solvers
+
+
+def solver_rows(one: Set) -> list[Row]:
+    """The solvers of a set as they are compared."""
+    found = []
+    for tol in one.tolerances:
+        for row in profiles.summary(one.costs.at(tol), weigh=WEIGH):
+            low, high = odds(row["solved"], row["of"])
+            found.append(
+                {
+                    "set": one.name,
+                    "tolerance": _results.power(tol),
+                    "solver": row["solver"].partition(" (")[0],
+                    "solved": f"{row['solved']} of {row['of']}",
+                    "95 % interval": f"{low:.2f} to {high:.2f}",
+                    "fastest": row["fastest"],
+                    "mean [s]": row["mean"],
+                    "to best": row["to best"],
+                }
+            )
+    return found
+
+
+def pictures(one: Set) -> Iterator[str]:
+    """Draw the profile of the best solvers at each tolerance, and the work-precision of a set."""
+    for tol in one.tolerances:
+        costs = one.costs.at(tol)
+        rows = profiles.summary(costs, weigh=WEIGH)[1 : DRAWN + 1]
+        part = costs.chosen([row["solver"] for row in rows])
+        name = f"published-{one.name}-{_results.power(tol)}"
+        draw(name, profile_of(part))
+        yield from image(name, f"{one.name} to {_results.power(tol)}: the best solvers")
+    if len(one.tolerances) > 1:
+        points = profiles.work_precision(one.rows, one.costs, weigh=WEIGH)
+        last = profiles.summary(one.costs.at(one.tolerances[-1]), weigh=WEIGH)[1 : DRAWN + 1]
+        chosen = {row["solver"] for row in last}
+        own = [point for point in points if point["solver"] in chosen]
+        name = f"published-{one.name}-work"
+        draw(name, lambda out: plots.work_precision(own, "cpu_s", out, ["png"]))
+        yield from image(name, f"{one.name}: the mean time of each tolerance")
+
+
+def profile_of(costs: Costs) -> Callable[[Path], None]:
+    """What draws the performance profile of some costs."""
+    return lambda out: plots.performance(costs, out, ["png"], weigh=WEIGH)
+
+
+def draw(name: str, drawing: Callable[[Path], None]) -> None:
+    """A picture of the bench as docs/images/NAME.png, small enough for a page."""
+    import tempfile
+
+    from PIL import Image
+
+    with tempfile.TemporaryDirectory() as folder:
+        drawing(Path(folder))
+        (path,) = Path(folder).glob("*.png")
+        with Image.open(path) as drawn:
+            size = (900, round(900 * drawn.height / drawn.width))
+            small = drawn.convert("RGB").resize(size).quantize(64)
+            small.save(IMAGES / f"{name}.png", optimize=True)
+
+
+def image(name: str, words: str) -> list[str]:
+    """The lines of a page that show a picture."""
+    return [f'<img src="images/{name}.png" width="700"', f'     alt="{words}">', ""]
+
+
+# ---- failures and kinds
+
+
+def failure_rows(one: Set) -> list[Row]:
+    """By family, tolerance and solver: how many are solved, and how the others ended."""
+    groups: dict[tuple[str, float, str], Counter[str]] = defaultdict(Counter)
+    for row in one.rows:
+        if row["status"] != "unsuitable" and not row["copy"]:
+            groups[row["family"], -row["tol"], row["solver"].partition(" (")[0]][row["status"]] += 1
+    found = []
+    for (family, tol, solver), ends in sorted(groups.items()):
+        failed = {name: n for name, n in ends.most_common() if not is_solved(name)}
+        count = sum(ends.values())
+        if failed:
+            found.append(
+                {
+                    "set": one.name,
+                    "family": family,
+                    "tolerance": _results.power(-tol),
+                    "solver": solver,
+                    "solved": f"{count - sum(failed.values())} of {count}",
+                    "ends": ", ".join(f"{n} {name}" for name, n in failed.items()),
+                }
+            )
+    return found
+
+
+def methods_of(one: Set) -> dict[str, list[str]]:
+    """The solvers of each family of methods."""
+    own: dict[str, list[str]] = defaultdict(list)
+    names, families = (words_in(one.rows, name).tolist() for name in ("solver", "solver_family"))
+    known = dict(zip(names, families, strict=True))
+    for solver in one.costs.solvers:
+        own[known.get(solver) or "another"].append(solver)
+    return dict(sorted(own.items()))
+
+
+def kind_of(family: str) -> str:
+    """The kind of the problems of a family: the set that it is of first."""
+    known = scenes.families() | scenes.assemblies()
+    return known[family].collection if family in known else family
+
+
+def best_in(costs: Costs, solvers: Sequence[str]) -> tuple[str, Array]:
+    """The solver that solves most, the fastest of these, and its costs."""
+    part = costs.chosen(solvers)
+    (best, *_) = profiles.summary(part, weigh=WEIGH)[1:]
+    return best["solver"], part.values[:, part.solvers.index(best["solver"])]
+
+
+def kind_rows(one: Set) -> list[Row]:
+    """By kind, tolerance and family of methods: its best solver."""
+    found = []
+    for tol in one.tolerances:
+        costs = one.costs.at(tol)
+        kinds: dict[str, list[int]] = defaultdict(list)
+        for k, instance in enumerate(costs.instances):
+            kinds[kind_of(instance.family)].append(k)
+        for kind, places in sorted(kinds.items()):
+            part = costs.on_instances(places)
+            for method, solvers in methods_of(one).items():
+                name, values = best_in(part, solvers)
+                solved = int(np.isfinite(values).sum())
+                both = np.isfinite(values) & np.isfinite(part.best)
+                ratio = np.exp(np.log(values[both] / part.best[both]).mean()) if solved else ""
+                found.append(
+                    {
+                        "set": one.name,
+                        "kind": kind,
+                        "tolerance": _results.power(tol),
+                        "methods": method,
+                        "best solver": name.partition(" (")[0],
+                        "solved": f"{solved} of {len(values)}",
+                        "mean ratio to the best of all": ratio,
+                    }
+                )
+    return found
+
+
+# ---- effects
+
+
+def facts_of(folder: Path) -> dict[str, Row]:
+    """The facts of problems of a built collection, by digest of each form."""
+    found: dict[str, Row] = {}
+    for row in collections.read_catalog(folder).to_pylist():
+        size = row["spacedim"] * row["nc"]
+        rank = row.get("rank_W")
+        found[row["digest"]] = row | {"rank ratio": rank / size if rank and size else None}
+    return found
+
+
+def effect_rows(one: Set, facts: Mapping[str, Row]) -> list[Row]:
+    """By tolerance, fact and family of methods: what the fact does to its best solver."""
+    found = []
+    for tol in one.tolerances:
+        costs = one.costs.at(tol)
+        for fact, words in EFFECTS.items():
+            known = [
+                instance.nc if fact == "nc" else facts.get(instance.hash, {}).get(fact)
+                for instance in costs.instances
+            ]
+            values = np.array([math.nan if x is None else float(x) for x in known])
+            there = np.flatnonzero(np.isfinite(values) & (values > 0))
+            if len(there) < 8 or len(np.unique(values[there])) < 4:
+                continue
+            part = costs.on_instances(there.tolist())
+            for method, solvers in methods_of(one).items():
+                name, own = best_in(part, solvers)
+                found.append(
+                    {
+                        "set": one.name,
+                        "tolerance": _results.power(tol),
+                        "fact": words,
+                        "methods": method,
+                        "solver": name.partition(" (")[0],
+                        **effect(values[there], own),
+                    }
+                )
+    return found
+
+
+def effect(values: Array, costs: Array) -> Row:
+    """The shift of the share that is solved, and the exponent of the time, with its interval."""
+    upper = values > np.median(values)
+    solved = np.isfinite(costs)
+    shift = solved[upper].mean() - solved[~upper].mean() if upper.any() else 0.0
+    x, y = np.log(values[solved]), np.log(costs[solved])
+    if len(x) < 8 or np.ptp(x) == 0:
+        return {"shift of the share": f"{shift:+.2f}", "exponent": "", "95 % interval": ""}
+    rng = np.random.default_rng(0)
+    slopes = []
+    for _ in range(500):
+        drawn = rng.integers(0, len(x), len(x))
+        if np.ptp(x[drawn]) > 0:
+            slopes.append(np.polyfit(x[drawn], y[drawn], 1)[0])
+    low, high = np.quantile(slopes, (0.025, 0.975))
+    return {
+        "shift of the share": f"{shift:+.2f}",
+        "exponent": f"{np.polyfit(x, y, 1)[0]:.2f}",
+        "95 % interval": f"{low:.2f} to {high:.2f}",
+    }
+
+
+# ---- the best of all
+
+
+def best_rows(one: Set) -> list[Row]:
+    """By tolerance: the virtual best, and the best one, two and three solvers."""
+    found = []
+    for tol in one.tolerances:
+        costs = one.costs.at(tol)
+        charges = profiles.PENALTY * costs.charges
+        whole = np.where(np.isfinite(costs.values), costs.values, charges[:, None])
+        chosen: list[int] = []
+        for _ in range(min(3, len(costs.solvers))):  # greedily: the one that helps most
+            means = [mean_of(whole[:, [*chosen, k]].min(axis=1)) for k in range(whole.shape[1])]
+            chosen.append(int(np.argmin(means)))
+            found.append(best_row(one, tol, costs, chosen))
+        found.append(best_row(one, tol, costs, range(len(costs.solvers))))
+    return found
+
+
+def best_row(one: Set, tol: float, costs: Costs, chosen: Sequence[int]) -> Row:
+    """What some solvers together do, if the fastest of them is known."""
+    values = comparison.least(costs.values[:, list(chosen)])
+    whole = np.where(np.isfinite(values), values, profiles.PENALTY * costs.charges)
+    names = [costs.solvers[k].partition(" (")[0] for k in chosen]
+    return {
+        "set": one.name,
+        "tolerance": _results.power(tol),
+        "solvers": " + ".join(names) if len(names) <= 3 else f"all {len(names)}",
+        "solved": f"{int(np.isfinite(values).sum())} of {len(values)}",
+        "mean [s]": mean_of(whole),
+    }
+
+
+def mean_of(values: Array) -> float:
+    """The shifted geometric mean."""
+    return float(np.expm1(np.log1p(values / profiles.SHIFT).mean()) * profiles.SHIFT)
+
+
+# ---- conclusions
+
+
+def conclusions(one: Set) -> list[Row]:
+    """Statements on a set, each with an interval and a bound."""
+    found = []
+    for tol in one.tolerances:
+        costs = one.costs.at(tol)
+        count = len(costs.instances)
+        quotients = profiles.ratios(costs.values)
+        rows = profiles.summary(costs, weigh=WEIGH)[1:]
+        place = costs.solvers.index(rows[0]["solver"])
+        wins = (quotients == 1).sum(axis=0)
+        most = int(wins.argmax())
+        near = int((quotients[:, place] <= 2).sum())
+
+        def say(
+            statement: str, figure: float, low: float, high: float, bound: float, below: bool,
+            tol: float = tol,
+        ) -> None:  # fmt: skip
+            carried = high < bound if below else low > bound
+            found.append(
+                {
+                    "set": one.name,
+                    "tolerance": _results.power(tol),
+                    "statement": statement,
+                    "figure": f"{figure:.3g}",
+                    "95 % interval": f"{low:.3g} to {high:.3g}",
+                    "bound": f"{'below' if below else 'above'} {bound:g}",
+                    "carried": "yes" if carried else "no",
+                }
+            )
+
+        name = costs.solvers[most].partition(" (")[0]
+        say(f"no solver is the fastest on most problems (the most often fastest is {name}): share",
+            wins[most] / count, *odds(int(wins[most]), count), 0.5, True)  # fmt: skip
+        name = rows[0]["solver"].partition(" (")[0]
+        say(f"no universal solver: the best one ({name}) is within twice the best: share",
+            near / count, *odds(near, count), 0.95, True)  # fmt: skip
+        say(f"the best solver ({name}) solves nearly all: share", rows[0]["solved"] / count,
+            *odds(rows[0]["solved"], count), 0.95, False)  # fmt: skip
+        for row in rows[1:2]:
+            (pair,) = profiles.pairs(
+                costs.chosen([row["solver"], rows[0]["solver"]]), rows[0]["solver"], weigh=WEIGH
+            )
+            if pair.both:
+                second = row["solver"].partition(" (")[0]
+                say(f"{second}, the next one, is slower than {name}: ratio of times",
+                    pair.ratio, pair.low, pair.high, 1.0, False)  # fmt: skip
+        methods = methods_of(one)
+        if {"newton", "splitting"} <= methods.keys():
+            first, _ = best_in(costs, methods["newton"])
+            second, _ = best_in(costs, methods["splitting"])
+            (pair,) = profiles.pairs(costs.chosen([first, second]), second, weigh=WEIGH)
+            if pair.both:
+                names = [one_of.partition(" (")[0] for one_of in (first, second)]
+                words = f"Newton ({names[0]}) is faster than sweeps ({names[1]}): ratio of times"
+                say(words,
+                    pair.ratio, pair.low, pair.high, 1.0, True)  # fmt: skip
+    return found
+
+
+# ---- sequences
+
+
+def warm(store: Path, rows: Table) -> list[Row]:
+    """By family and solver: what a guess is worth."""
+    return [
+        {
+            "family": row["sequence"].partition(",")[0],
+            "solver": row["solver"].partition(" (")[0],
+            "cold CPU / warm CPU": f"{row['cold CPU / warm CPU']:.2f}",
+            "iterations warm": row["iterations warm"],
+            "iterations cold": row["iterations cold"],
+            "solved warm": row["solved warm"],
+            "solved cold": row["solved cold"],
+            "of": row["of"],
+        }
+        for row in profiles.along(store, rows)
+    ]
+
+
+# ---- the comparison of 2018
+
+
+Curve: TypeAlias = list[tuple[float, float]]
+
+
+def curves_of(path: Path) -> dict[tuple[str, float], dict[str, Curve]]:
+    """The published curves: by set and tolerance, then by solver, the steps (tau, share)."""
+    found: dict[tuple[str, float], dict[str, Curve]] = defaultdict(lambda: defaultdict(list))
+    with path.open(newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            key = row["set"], float(row["tolerance"])
+            found[key][row["solver"]].append((float(row["tau"]), float(row["share"])))
+    return found
+
+
+def share_at(curve: Curve, taus: Array) -> Array:
+    """The shares of a step curve at some ratios."""
+    steps = np.array(sorted(curve))
+    place = np.searchsorted(steps[:, 0], taus, side="right") - 1
+    return np.asarray(np.where(place >= 0, steps[np.maximum(place, 0), 1], 0.0))
+
+
+def of_paper(one: Set, path: Path) -> list[str]:
+    """The curves of the paper beside ours, set by set."""
+    theirs = curves_of(path)
+    rows = []
+    lines = ["## How does the comparison of 2018 come out?", ""]
+    for (name, tol), own in sorted(theirs.items()):
+        family = next((ours for ours, known in SETS.items() if known == name), name)
+        part = one.every.at(tol)
+        part = part.on_instances(
+            k for k, instance in enumerate(part.instances) if instance.family == family
+        )
+        labels = [solver for solver in own if solver in part.solvers]
+        if not part.instances or len(labels) < 2:
+            continue
+        ours = part.chosen(labels)
+        there = np.flatnonzero(ours.there.all(axis=1))
+        if not len(there):
+            continue
+        ours = ours.on_instances(there.tolist())
+        taus = np.unique([tau for curve in own.values() for tau, _ in curve])
+        shares = profiles.performance_profile(ours.values, taus)
+        for k, solver in enumerate(labels):
+            apart = np.abs(shares[k] - share_at(own[solver], taus))
+            rows.append(
+                {
+                    "set": name,
+                    "tolerance": _results.power(tol),
+                    "solver": solver,
+                    "our problems": len(there),
+                    "largest distance": f"{apart.max():.2f}",
+                    "at": f"{taus[apart.argmax()]:.3g}",
+                    "chance alone, up to": f"{BAND / math.sqrt(len(there)):.2f}",
+                    "Siconos beside it": siconos(part, labels, solver, own[solver], taus),
+                }
+            )
+        picture = f"published-2018-{name}-{_results.power(tol)}"
+        beside(picture, f"{name} to {_results.power(tol)}", labels, taus, shares, own)
+        lines += image(picture, f"{name} to {_results.power(tol)}: the paper's curves and ours")
+    if not rows:
+        return []
+    note = (
+        "The curves of the paper (Acary, Bremond & Huber 2018) were read from its figures. `at` is"
+        " the ratio of the largest vertical distance. Siconos beside it: the same distance, if"
+        " Siconos' own implementation takes the place of ours."
+    )
+    return [*lines, *table("published-2018", rows, "The paper's curves and ours", note)]
+
+
+def siconos(part: Costs, labels: Sequence[str], solver: str, curve: Curve, taus: Array) -> str:
+    """The distance of the paper's curve, with Siconos' implementation in the place of ours."""
+    other = OWN.get(solver, "")
+    if other not in part.solvers:
+        return ""
+    chosen = part.chosen([other if name == solver else name for name in labels])
+    there = np.flatnonzero(chosen.there.all(axis=1))
+    if not len(there):
+        return ""
+    shares = profiles.performance_profile(chosen.on_instances(there.tolist()).values, taus)
+    return f"{np.abs(shares[labels.index(solver)] - share_at(curve, taus)).max():.2f}"
+
+
+def beside(
+    name: str,
+    title: str,
+    labels: Sequence[str],
+    taus: Array,
+    ours: Array,
+    theirs: Mapping[str, Curve],
+) -> None:
+    """Draw the paper's curves and ours in two fields with one legend."""
+    import matplotlib.pyplot as plt
+
+    with plt.rc_context(plots.STYLE):
+        drawn, fields = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True, layout="constrained")
+        for k, label in enumerate(labels):
+            style = plots.stroke(k)
+            fields[0].step(taus, share_at(theirs[label], taus), where="post", **style)
+            fields[1].step(taus, ours[k], where="post", label=label, **style)
+        for field, words in zip(fields, (f"{title}: the paper", "ours"), strict=True):
+            field.set(xscale="log", xlabel="ratio to the best", title=words, ylim=(0, 1.02))
+        fields[0].set_ylabel("share of problems")
+        drawn.legend(loc="outside right center")
+        drawn.savefig(IMAGES / f"{name}.png", dpi=100)
+        plt.close(drawn)
+
+
+if __name__ == "__main__":
+    main()

@@ -430,12 +430,16 @@ def mean_square_root(x: Balls) -> arb:
     return norm(x) / arb(max(1, len(x))).sqrt()
 
 
-def stopping(velocity: Balls, diagonal: Balls, d: int) -> Balls:
-    """r_0: reactions that stop these velocities, each contact alone; 0 where W_aa is."""
+def stopping(velocity: Balls, diagonal: Balls, d: int, least: arb | None = None) -> Balls:
+    """r_0: reactions that stop these velocities, each contact alone; 0 where W_aa is.
+
+    No contact counts as slower than `least`: r_1.
+    """
     result = []
     for part, own in zip(by_contact(velocity, d), by_contact(diagonal, d), strict=True):
         size = sum((abs(x) for x in own), arb(0)) / d
-        result += [quotient(norm(part), size)] * d
+        velocity_of = norm(part) if least is None else norm(part).max(least)
+        result += [quotient(velocity_of, size)] * d
     return result
 
 
@@ -504,14 +508,18 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
     own = add(H.sizes_transposed(free), [abs(x) for x in w])
     effect = H.times(r)
     known_r, known_l = stopping(own, diagonal, d), zeros(0)
-    stop = H.sizes(known_r)
+    stop = H.sizes(stopping(own, diagonal, d, mean_square_root(q)))
     G = b = None
     if problem.G is not None:
         assert solution.l is not None
         G, b, lam = Sparse(problem.G), balls(problem.b), balls(solution.l)
         velocity = add(G.sizes_transposed(free), [abs(x) for x in b])
-        held = [quotient(x, y) for x, y in zip(velocity, mass.gram(G), strict=True)]
-        effect, known_l, stop = add(effect, G.times(lam)), held, add(stop, G.sizes(held))
+        inertia = mass.gram(G)
+        held = [quotient(x, y) for x, y in zip(velocity, inertia, strict=True)]
+        slowest = [mean_square_root(add(G.transposed(free), b))] * len(b)
+        least_held = [quotient(x, y) for x, y in zip(slowest, inertia, strict=True)]
+        effect, known_l = add(effect, G.times(lam)), held
+        stop = add(stop, G.sizes(larger(held, least_held)))
     impulse = add(effect, f)
     given = solution.v is not None
     v = balls(solution.v) if given else mass.solve(impulse)
@@ -554,7 +562,7 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
         residual = add(G.transposed(v), b)
         parts = add(G.sizes_transposed(fastest), [abs(x) for x in b])
         allowed = add(parts, mass.spread(G, terms)) if unit else parts
-        bilateral = worst(beyond(residual, allowed, unit), parts)
+        bilateral = worst(beyond(residual, allowed, unit), larger(parts, slowest))
     rounding = rounding or zeros(len(q))
     return Terms(u, q, own, rounding, diagonal, dynamics, bilateral, kinematics)
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "convert/arrange.hpp"
+#include "linalg/groups.hpp"
 #include "problem.hpp"
 
 namespace fclib {
@@ -48,25 +49,6 @@ struct Islands {
         return static_cast<Index>(contact.size());
     }
   }
-};
-
-/// Finds the groups that links join.
-class Groups {
- public:
-  explicit Groups(Index count) : parent_(Places::unchanged(count).to) {}
-  Index find(Index node) {
-    while (parent_[node] != node) node = parent_[node] = parent_[parent_[node]];
-    return node;
-  }
-  void link(Index a, Index b) {
-    // the root of a group is its first node
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<Index> parent_;
 };
 
 /// The islands of a problem, which must be valid. A stored zero links nothing.

@@ -14,9 +14,15 @@ class Groups {
     std::iota(parent_.begin(), parent_.end(), 0);
   }
 
+  /// The first member of the group of k.
+  Index find(Index k) {
+    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
+    return k;
+  }
+
   void link(Index a, Index b) {
-    a = first(a);
-    b = first(b);
+    a = find(a);
+    b = find(b);
     if (a < b) parent_[b] = a;
     if (b < a) parent_[a] = b;
   }
@@ -26,19 +32,13 @@ class Groups {
     std::vector<Index> group(parent_.size());
     Index count = 0;
     for (Index k = 0; k < static_cast<Index>(group.size()); ++k) {
-      const Index top = first(k);
+      const Index top = find(k);
       group[k] = top == k ? count++ : group[top];
     }
     return group;
   }
 
  private:
-  /// The first member of the group of k.
-  Index first(Index k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-
   std::vector<Index> parent_;
 };
 

@@ -18,7 +18,7 @@ from fclib.bench.runner import Queue, with_guess
 def job(key: str, after: str = "", step: int = 0) -> Any:
     """A run, of a sequence if it waits for another one or is its first step."""
     along = SimpleNamespace(after=after, step=step) if after or step else None
-    return SimpleNamespace(key=key, along=along)
+    return SimpleNamespace(key=key, along=along, after=after)
 
 
 def queue(jobs: list[Any], retries: int = 2, **parts: Any) -> Queue:

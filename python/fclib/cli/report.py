@@ -82,7 +82,7 @@ def command(
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the site.")] = "",
 ) -> None:
-    """Make a site to browse from stores, published runs and a catalogue.
+    """Make a site to browse from stores and a catalogue.
 
     Open its index.html. Only pages that check and solve problems (--with-files) need a server:
     --serve. Without stores and catalogue, --serve serves a site that is there already.

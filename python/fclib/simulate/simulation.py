@@ -10,12 +10,13 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from fclib import _core, _geometry, _laws, _solve
 from fclib._origin import origin_of
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
-from fclib.simulate.arrays import Sparse, columns_of, submatrix
+from fclib.simulate.arrays import Sparse, submatrix
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.equalities import RANK, dependence, gaps_of
 from fclib.simulate.geometry import places_of
@@ -291,34 +292,9 @@ def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vecto
 
 
 def moving_part(H: Sparse, change: Vector) -> Vector:
-    """The part H^T y of a change of reactions (m) that moves bodies: the rest has H dr = 0.
-
-    By conjugate gradients on H H^T y = H change: the least x with H x = H change.
-    """
-    columns = columns_of(H)
-
-    def moved(x: Vector) -> Vector:
-        sums = np.bincount(H.indices, H.data * x.take(columns), H.shape[0])
-        return np.asarray(sums, dtype=float)
-
-    def pushed(y: Vector) -> Vector:
-        sums = np.bincount(columns, H.data * y.take(H.indices), H.shape[1])
-        return np.asarray(sums, dtype=float)
-
-    left = moved(change)
-    sizes = np.bincount(H.indices, np.abs(H.data * change.take(columns)))
-    least, square = EXACT**2 * (sizes @ sizes), left @ left
-    part = np.zeros(len(change))
-    direction = pushed(left)
-    for _ in range(MOST):
-        if square <= least or not direction.any():
-            break
-        step = square / (direction @ direction)
-        part += step * direction
-        left -= step * moved(direction)
-        before, square = square, left @ left
-        direction = pushed(left) + square / before * direction
-    return part
+    """The part of a change of reactions (m) that moves bodies: the least x with H x = H change."""
+    found = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
+    return np.asarray(found)
 
 
 def in_range(values: Vector, bound: float) -> bool:

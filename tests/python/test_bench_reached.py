@@ -57,6 +57,11 @@ def test_a_run_that_failed_may_have_passed_the_larger_tolerance() -> None:
     assert (never.status, never.cpu_s, never.iterations) == ("stalled", 2.0, 9)
 
 
+def test_a_proof_is_not_read_off_as_a_solution() -> None:
+    assert read_off(RUN | {"status": "infeasible", "error": 1.0}, HISTORY, 1e-4, None) is None
+    assert read_off(RUN | {"status": "infeasible"}, HISTORY, 1e-4, None) is None
+
+
 @pytest.mark.parametrize("lacks", [{"cpu_s": None}, {"error": None}, {"error": float("inf")}, {}])
 def test_a_run_that_says_too_little_is_not_read_off(lacks: dict[str, Any]) -> None:
     assert read_off(RUN | lacks, HISTORY if lacks else [], 1e-4, None) is None

@@ -37,6 +37,8 @@ def read_off(
         tol: the larger tolerance.
         machine: the facts of its machine.
     """
+    if run["status"] == "infeasible":
+        return None  # a proof ended it; an iterate before it is no solution
     cpu_s, judged = run["cpu_s"], error_by(run, run["merit"])
     times, errors = least_errors(history, cpu_s)
     if not times.size or cpu_s is None or judged is None:

@@ -332,7 +332,15 @@ def preempted() -> None:
 
 @jobqueue
 @pytest.mark.slow
-@pytest.mark.parametrize(("processes", "way"), [("1", cancelled), ("2", preempted)])
+@pytest.mark.parametrize(
+    ("processes", "way"),
+    [
+        ("1", cancelled),
+        ("2", preempted),
+        pytest.param("1", preempted, marks=pytest.mark.long),
+        pytest.param("2", cancelled, marks=pytest.mark.long),
+    ],
+)
 def test_jobs_of_slurm_that_end_are_replaced(
     processes: str, way: Any, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -118,6 +118,34 @@ def test_a_tenth_is_repeated_between_the_others() -> None:
     assert len(campaign(repeats=3).plan()) == 3 * 14
 
 
+def test_only_what_was_solved_is_repeated(tmp_path: Path) -> None:
+    """A solver that ends after one sweep solves no problem, so it is run once."""
+    module = tmp_path / "reached_short.py"
+    module.write_text(
+        "import fclib\n\n\n@fclib.solver('short')\ndef solve(problem, r, monitor):\n"
+        "    r[:] = fclib.solve(problem, 'nsgs', max_iterations=1).solution.r\n    monitor.stop(r)\n"
+    )
+    chosen = campaign(
+        solvers=["nsgs", "short"],
+        modules=[str(module)],
+        problems=PROBLEMS[:1],
+        repeats=2,
+        renumber=True,
+        repeat_solved=True,
+        from_history=[1e-4],
+    )
+    path = tmp_path / "solved.sqlite"
+    bench.run_campaign(chosen, path)
+    with bench.Store(path) as store:
+        rows = list(store.table())
+    counts = Counter((row["solver"], row["tol"], row["repeat"]) for row in rows)
+    whole = {("nsgs", tol, repeat): 4 for tol in (1e-8, 1e-4) for repeat in (0, 1)}
+    assert counts == whole | {("short", tol, 0): 4 for tol in (1e-8, 1e-4)}
+    assert all(bool(row["solved"]) == (row["solver"] == "nsgs") for row in rows)
+    again = bench.run_campaign(chosen, path)
+    assert (again.planned, again.skipped, sum(again.statuses.values())) == (32, 32, 0)
+
+
 def test_a_share_is_evenly_spread() -> None:
     assert share_of(range(100), 0.1) == [4, 14, 24, 34, 44, 54, 64, 74, 84, 94]
     assert share_of(range(3), 0.1) == [1]
@@ -130,6 +158,7 @@ def test_a_share_is_evenly_spread() -> None:
     [
         ({"repeated": 1.5}, "repeated: 1.5 is above 1"),
         ({"repeated": 0}, "repeated"),
+        ({"repeat_solved": 1}, "repeat_solved"),
         ({"from_history": [1e-8]}, "not larger"),
         ({"from_history": 1e-4}, "no list"),
     ],

@@ -137,6 +137,29 @@ def test_a_part_is_never_written_twice(tmp_path: Path) -> None:
     assert {row["solver"] for row in results.rows_of(second)} == {"ppa-nsn"}
 
 
+def test_a_campaign_goes_on_from_published_runs(tmp_path: Path) -> None:
+    """No published run is done again or packed again, and its machine keeps its name."""
+    packed(tmp_path)
+    parts = tmp_path / "parts"
+    words = ["results", "unpack", str(tmp_path / "mine.sqlite"), "--in", str(parts)]
+    done = CliRunner().invoke(app, [*words, "--name", "small"])
+    assert done.exit_code == 0, done.output
+    assert "16 runs are new" in done.output
+    more = bench.Campaign.of({**PLAN, "solvers": ["nsgs", "apgd", "ppa-nsn"]})
+    progress = bench.run_campaign(more, tmp_path / "mine.sqlite")
+    assert (progress.skipped, sum(progress.statuses.values())) == (16, 8)
+    with bench.Store(tmp_path / "mine.sqlite") as opened:
+        found = results.pack(opened, parts, "small", "slow", results.shards(parts))
+        assert found is not None
+        rows = list(results.rows_of(found))
+        assert {(row["solver"], row["node"]) for row in rows} == {("ppa-nsn", "slow")}
+        assert list(results.shards(parts)[0].machines) != list(results.shards(parts)[1].machines)
+        assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is None
+    wrong = CliRunner().invoke(app, [*words, "--name", "large"])
+    assert wrong.exit_code == 1
+    assert "large: there is no such part" in wrong.output
+
+
 def test_a_part_that_was_changed_is_found(tmp_path: Path) -> None:
     part = packed(tmp_path)
     data = bytearray(part.read_bytes())

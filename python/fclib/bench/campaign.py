@@ -43,6 +43,7 @@ KNOWN = {
     *NUMBERS,
     "repeats",
     "repeated",
+    "repeat_solved",
     "threads",
     "seed",
     "history",
@@ -117,6 +118,7 @@ class Campaign:
     title: str = ""
     repeats: int = 1
     repeated: float = 1.0  # share of the problems that are repeated, and whose solutions are kept
+    repeat_solved: bool = False  # whether a run is repeated only if the first one solved
     # larger tolerances, at which runs of built-in solvers are read off their histories: reached.py
     from_history: tuple[float, ...] = ()
     threads: int = 1
@@ -207,6 +209,7 @@ class Campaign:
             groups=groups,
             repeats=_count(entries, "repeats", 1),
             repeated=_share(entries, "repeated"),
+            repeat_solved=_yes(entries, "repeat_solved"),
             from_history=larger,
             threads=_count(entries, "threads", 1),
             seed=seed,
@@ -233,7 +236,7 @@ class Campaign:
 
         They go repeat by repeat, each shuffled.
 
-        If there is a budget, or if only a share of the problems is repeated, they go problem after
+        If there is a budget, or if only a share of the runs is repeated, they go problem after
         problem. So a part of the campaign is spread evenly over the groups and families, and every
         problem that was begun has been solved by all solvers. The repeats of a share come between
         the other problems, some time after the first run.
@@ -291,7 +294,7 @@ class Campaign:
             if self.budget is not None and self.repeated == 1:
                 ours = spread(ours)
             order += ours
-        if self.repeated < 1:
+        if self.repeated < 1 or self.repeat_solved:
             order = spread(order)
         jobs: dict[str, Job] = {}
         for job in order:
@@ -333,6 +336,8 @@ class Campaign:
         for tol in known:
             job = self._job(facts, group, choice, tol, repeat)
             jobs.append(replace(job, off=least.key) if believed else job)
+        if repeat and self.repeat_solved:
+            jobs = [replace(job, first=replace(job, repeat=0).key) for job in jobs]
         return jobs
 
     def _job(

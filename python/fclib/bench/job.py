@@ -175,6 +175,7 @@ class Job:
     renumber: bool = False  # whether each repeat but the first is of a copy: copies.py
     # key of the run at a smaller tolerance whose history may answer this job: reached.py
     off: str = ""
+    first: str = ""  # key of the first run, if this repeat is needed only if that run solved
 
     @property
     def start(self) -> str:
@@ -204,7 +205,7 @@ class Job:
     @property
     def after(self) -> str:
         """The key of the run that this one waits for; empty if there is none."""
-        return self.along.after if self.along else self.off
+        return self.along.after if self.along else self.off or self.first
 
     @property
     def copy(self) -> int:

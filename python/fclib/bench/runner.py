@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
-from fclib._verdicts import SOLVED
+from fclib._verdicts import SOLVED, is_solved
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Guess, Job, Record, Runner
@@ -33,7 +33,7 @@ class Progress:
     """The progress of a campaign."""
 
     planned: int
-    skipped: int  # runs that were in the store before
+    skipped: int  # runs that were in the store before, or are not needed
     statuses: Counter[str] = field(default_factory=Counter)  # statuses of the runs done now
     not_run: Counter[str] = field(default_factory=Counter)  # causes that kept runs from being done
     reason: str = ""  # cause of the last run that was not done
@@ -185,6 +185,12 @@ def read_off_from(store: Store, job: Job) -> Record | None:
     return read_off(run, store.history(run["id"]), job.tol, store.machine_of(run))
 
 
+def is_needed(store: Store, job: Job) -> bool:
+    """Whether a job must be done: a repeat may be of use only if the first run solved."""
+    first = store.run_of(job.first) if job.first else None
+    return not job.first or (first is not None and is_solved(first["status"]))
+
+
 def run_campaign(
     campaign: Campaign,
     store: str | Path,
@@ -241,9 +247,9 @@ def run_campaign(
 
         def begin(job: Job) -> Job | None:
             """The job; None if it is done already, by another campaign or by the run it is read off
-            from, or if the budget is too small.
+            from, if it is not needed, or if the budget is too small.
             """
-            if opened.has(job.key):
+            if opened.has(job.key) or not is_needed(opened, job):
                 progress.skipped += 1
                 queue.finish(job)
                 return None

@@ -168,6 +168,33 @@ def pack(
 
 
 @app.command()
+def unpack(
+    store: Annotated[Path, typer.Argument(help="A store of `fclib bench`, made if there is none.")],
+    names: Annotated[
+        list[str] | None, typer.Option("--name", help='Parts of this name, as "standard".')
+    ] = None,
+    where: Where = None,
+) -> None:
+    """Put published runs into a store, so that `fclib bench --store` goes on with a campaign.
+
+    It goes on even if they were made on another machine: no run whose solver is still the same is
+    done again.
+    """
+    found = parts_of(where)
+    chosen = [one for one in found if not names or one.name in names]
+    if lost := sorted(set(names or ()) - {one.name for one in found}):
+        fail(f"{', '.join(lost)}: there is no such part; fclib results list shows them")
+    try:
+        with bench.Store(store) as opened:
+            count = results.unpack(chosen, opened)
+    except (ImportError, fclib.Error) as error:
+        fail(str(error))
+    except OSError as error:
+        fail(words_of(error))
+    out.print(f"{store}: {count} runs are new", highlight=False)
+
+
+@app.command()
 def submit(
     store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
     name: Annotated[str, typer.Option(help='Set of the runs, as "standard".')],

@@ -13,7 +13,7 @@ checkout.
 
 from fclib.results.beside import BesideError, Joined, alone, beside
 from fclib.results.leaders import leaders
-from fclib.results.shards import Shard, ShardError, folder, pack, rows_of, shards, verify
+from fclib.results.shards import Shard, ShardError, folder, pack, rows_of, shards, unpack, verify
 from fclib.results.submission import judged, submit
 
 __all__ = [
@@ -30,5 +30,6 @@ __all__ = [
     "rows_of",
     "shards",
     "submit",
+    "unpack",
     "verify",
 ]

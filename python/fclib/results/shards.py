@@ -169,10 +169,13 @@ def pack(
     if not NAME.fullmatch(name):
         raise ShardError(f"{name!r}: is no name of a part: use letters, digits, . _ -")
     pa = arrow()
+    published = list(there)
     known = {
-        (row["key"], row["node"]) for one in there for row in rows_of(one.path, ("key", "node"))
+        (row["key"], row["node"]) for one in published for row in rows_of(one.path, ("key", "node"))
     }
-    own = store.machines()
+    # runs that `unpack` has put there are published under the name of their machine
+    packed = {name for one in published for name in one.machines}
+    own = {k: facts for k, facts in store.machines().items() if facts.get("node") not in packed}
     nodes = sorted({str(facts.get("node")) for facts in own.values()})
     if machine and len(nodes) > 1:
         raise ShardError(
@@ -184,8 +187,8 @@ def pack(
     rows = []
     kept = sampled(store) if solutions else set()
     for row in store.table(more=LONG):
-        label = public[row["machine"]]
-        if (row["key"], label) in known:
+        label = public.get(row["machine"])
+        if label is None or (row["key"], label) in known:
             continue
         vectors = store.solution(row["run"]) if row["run"] in kept else {}
         history = thinned(store.history(row["run"]))
@@ -216,6 +219,20 @@ def pack(
     path = where / f"{name}-{sha256(part)[:DIGITS]}.parquet"
     part.replace(path)
     return path
+
+
+def unpack(parts: Iterable[Shard], store: Store) -> int:
+    """Put the runs of parts into a store, so that a campaign goes on from there.
+
+    The campaign does not repeat them, on whatever machine it runs. Their machines keep their names.
+
+    Returns:
+        The number of runs that the store did not have.
+
+    Raises:
+        ShardError: a part cannot be read.
+    """
+    return sum(store.add_rows(rows_of(one.path), one.machines) for one in parts)
 
 
 def thinned(history: Sequence[Sequence[Any]]) -> list[dict[str, Any]]:

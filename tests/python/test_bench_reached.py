@@ -123,7 +123,8 @@ def test_only_what_was_solved_is_repeated(tmp_path: Path) -> None:
     module = tmp_path / "reached_short.py"
     module.write_text(
         "import fclib\n\n\n@fclib.solver('short')\ndef solve(problem, r, monitor):\n"
-        "    r[:] = fclib.solve(problem, 'nsgs', max_iterations=1).solution.r\n    monitor.stop(r)\n"
+        "    r[:] = fclib.solve(problem, 'nsgs', max_iterations=1).solution.r\n"
+        "    monitor.stop(r)\n"
     )
     chosen = campaign(
         solvers=["nsgs", "short"],

@@ -313,7 +313,7 @@ def test_the_steps_beyond_a_budget_are_done_later(
 def test_what_follows_a_run_that_is_done_again_is_done_again(
     broken: Path, with_a_failure: Path, tmp_path: Path
 ) -> None:
-    path = shutil.copy(with_a_failure, tmp_path / "again.sqlite")
+    path = Path(shutil.copy(with_a_failure, tmp_path / "again.sqlite"))
     failed = chain(rows_of(path))[HOPELESS]
     before = {row["key"]: row["run"] for row in rows_of(path)}
     bench.run_campaign(campaign(broken), path, retry=[failed["status"]])

@@ -19,6 +19,11 @@ using Contiguous = nb::ndarray<const Number, nb::ndim<1>, nb::c_contig, nb::devi
   throw Error(ErrorKind::problem, message, what);
 }
 
+/// Whether the object is an array of NumPy itself: those of subclasses may have hidden entries.
+bool is_plain_array(nb::handle object) {
+  return object.type().is(nb::module_::import_("numpy").attr("ndarray"));
+}
+
 /// The object as a contiguous NumPy array of a type. It is copied only if it is not one already.
 nb::object as_array(nb::handle object, const char* type, const char* what) {
   const nb::module_ numpy = nb::module_::import_("numpy");
@@ -41,12 +46,19 @@ nb::object as_array(nb::handle object, const char* type, const char* what) {
 
 template <class Number>
 Contiguous<Number> as_contiguous(nb::handle object, const char* type, const char* what) {
+  // NumPy's functions take longer than a copy of the entries of a few bodies
+  Contiguous<Number> found;
+  if (is_plain_array(object) && nb::try_cast(object, found, false)) return found;
   const nb::object array = as_array(object, type, what);
   if (nb::cast<int>(array.attr("ndim")) != 1) unfit(what, "is not one-dimensional");
   return nb::cast<Contiguous<Number>>(array);
 }
 
 std::vector<Index> indices_from(nb::handle object, const char* what) {
+  Contiguous<Index> own;
+  if (is_plain_array(object) && nb::try_cast(object, own, false)) {
+    return {own.data(), own.data() + own.shape(0)};
+  }
   const auto array = as_contiguous<std::int64_t>(object, "int64", what);
   std::vector<Index> result(array.shape(0));
   for (std::size_t k = 0; k < result.size(); ++k) {

@@ -13,6 +13,7 @@ So what is above a tolerance beyond these allowances is wrong by any reading of 
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ import fclib
 
 Balls: TypeAlias = list[arb]
 Doubles: TypeAlias = npt.NDArray[np.float64]
+Effects: TypeAlias = list[list[tuple[int, arb]]]
 
 PRECISIONS = (256, 512, 1024, 2048, 4096, 8192)  # in bits; doubles reach from 2^-1074 to 2^1024
 NARROW = 2.0**-56  # radius of an error relative to it: what is left is below a double's last digit
@@ -137,6 +139,7 @@ class Sparse:
             result[j] = result[j] + abs(value * x[i])
         return result
 
+    @functools.cached_property
     def dense(self) -> Doubles:
         """The matrix in doubles."""
         result = np.zeros((self.rows, self.columns))
@@ -150,13 +153,6 @@ class Sparse:
         for i, j, value in self.entries:
             if i == j:
                 result[i] = value
-        return result
-
-    def column_entries(self) -> list[list[tuple[int, arb]]]:
-        """Rows and values of each column."""
-        result: list[list[tuple[int, arb]]] = [[] for _ in range(self.columns)]
-        for i, j, value in self.entries:
-            result[j].append((i, value))
         return result
 
 
@@ -190,52 +186,52 @@ class Mass:
                 result[row] = x[k, 0]
         return result
 
-    def gram(self, A: Sparse) -> Balls:
-        """The diagonal of A^T M^-1 A."""
-        result = zeros(A.columns)
+    def effects(self, A: Sparse) -> Effects:
+        """The columns of A^T M^-1 that are not zero, row by row."""
+        result: Effects = [[] for _ in range(A.columns)]
         touched: list[dict[int, list[tuple[int, arb]]]] = [{} for _ in self.members]
-        for j, column in enumerate(A.column_entries()):
-            for i, a in column:
-                touched[self.part[i]].setdefault(j, []).append((self.place[i], a))
+        for i, j, a in A.entries:
+            touched[self.part[i]].setdefault(j, []).append((self.place[i], a))
         for rows, inverse, columns in zip(self.members, self.inverses, touched, strict=True):
-            own = arb_mat(len(rows), len(columns))
+            own = arb_mat(len(columns), len(rows))
             for k, entries in enumerate(columns.values()):
                 for place, a in entries:
-                    own[place, k] = a
-            moved = inverse * own
-            for k, (j, entries) in enumerate(columns.items()):
-                result[j] += sum((a * moved[place, k] for place, a in entries), arb(0))
-        return result
-
-    def spread(self, A: Sparse, impulses: Balls) -> Balls:
-        """abs(A^T M^-1) abs(impulses): at least what they do with any signs."""
-        result = []
-        for column in A.column_entries():
-            total = arb(0)
-            for part in {self.part[i] for i, _ in column}:
-                inverse = self.inverses[part]
-                touched = [(self.place[i], a) for i, a in column if self.part[i] == part]
-                for k, row in enumerate(self.members[part]):
-                    own = sum((a * inverse[i, k] for i, a in touched), arb(0))
-                    total += abs(own * impulses[row])
-            result.append(total)
+                    own[k, place] = a
+            moved = own * inverse
+            for k, j in enumerate(columns):
+                result[j] += [(row, moved[k, place]) for place, row in enumerate(rows)]
         return result
 
     def terms(self, v: Balls) -> Balls:
         """abs(M) abs(v) + e(v), which is what the factors of M add up on the way to v."""
-        L = self.factor()
+        L = self.factor
         own = zeros(len(v)) if L is None else balls(abs(L) @ abs(L.T @ doubles(v)))
         return add(self.matrix.sizes(v), own)
 
+    @functools.cached_property
     def factor(self) -> Doubles | None:
         """L of M = L L^T, None if M is not symmetric and positive definite."""
-        M = self.matrix.dense()
+        M = self.matrix.dense
         if not np.array_equal(M, M.T):
             return None
         try:
             return np.asarray(np.linalg.cholesky(M), dtype=float)
         except np.linalg.LinAlgError:
             return None
+
+
+def gram(A: Sparse, effects: Effects) -> Balls:
+    """The diagonal of A^T M^-1 A."""
+    known = [dict(own) for own in effects]
+    result = zeros(A.columns)
+    for i, j, a in A.entries:
+        result[j] += a * known[j][i]
+    return result
+
+
+def spread(effects: Effects, impulses: Balls) -> Balls:
+    """abs(A^T M^-1) abs(impulses): at least what they do with any signs."""
+    return [sum((abs(x * impulses[row]) for row, x in own), arb(0)) for own in effects]
 
 
 def least_reactions(A: Doubles, effect: Doubles) -> Balls:
@@ -459,15 +455,34 @@ def beyond(residual: Balls, terms: Balls, unit: float) -> Balls:
     return result
 
 
+@functools.lru_cache(maxsize=16)
+def local_matrices(problem: Any, _precision: int) -> tuple[Sparse, ...]:
+    """W, and V and R of a mixed problem."""
+    names = ("W",) if problem.V is None else ("W", "V", "R")
+    return tuple(Sparse(getattr(problem, name)) for name in names)
+
+
+@functools.lru_cache(maxsize=16)
+def global_matrices(problem: Any, _precision: int) -> list[Any]:
+    """M with its inverse, and H; then G of a mixed problem: each with its effects and W_kk."""
+    mass = Mass(Sparse(problem.M))
+    found: list[Any] = [mass]
+    for A in [Sparse(x) for x in (problem.H, problem.G) if x is not None]:
+        effects = mass.effects(A)
+        found += [A, effects, gram(A, effects)]
+    return found
+
+
 def local_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> Terms:
     """U = W r + V l + q, V^T r + R l + s = 0."""
-    d, r, q, W = problem.spacedim, balls(solution.r), balls(problem.q), Sparse(problem.W)
+    d, r, q = problem.spacedim, balls(solution.r), balls(problem.q)
+    W, *joints = local_matrices(problem, ctx.prec)
     diagonal = W.diagonal()
     u, own = add(W.times(r), q), [abs(x) for x in q]
     rounding, bilateral, V = zeros(len(q)), arb(0), None
-    if problem.V is not None:
+    if joints:
         assert solution.l is not None
-        V, R, s, lam = Sparse(problem.V), Sparse(problem.R), balls(problem.s), balls(solution.l)
+        (V, R), s, lam = joints, balls(problem.s), balls(solution.l)
         size = [abs(x) for x in s]
         held = [quotient(a, abs(b)) for a, b in zip(size, R.diagonal(), strict=True)]
         u, moved = add(u, V.times(lam)), V.sizes(held)
@@ -475,9 +490,9 @@ def local_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> T
     stop = stopping(own, diagonal, d)
     known_r, known_l = stop, zeros(0) if V is None else held
     if unit:
-        A, effect = W.dense(), W.times(r)
+        A, effect = W.dense, W.times(r)
         if V is not None:
-            A = np.block([[A, V.dense()], [V.dense().T, R.dense()]])
+            A = np.block([[A, V.dense], [V.dense.T, R.dense]])
             effect = add(effect, V.times(lam)) + add(V.transposed(r), R.times(lam))
         least = least_reactions(A, doubles(effect))
         known_r, known_l = larger(stop, least[: len(r)]), larger(known_l, least[len(r) :])
@@ -502,19 +517,18 @@ def local_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> T
 def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> Terms:
     """M v = H r + G l + f, u = H^T v + w, G^T v + b = 0."""
     d, r, f, w = problem.spacedim, balls(solution.r), balls(problem.f), balls(problem.w)
-    mass, H = Mass(Sparse(problem.M)), Sparse(problem.H)
-    free, diagonal = mass.solve(f), mass.gram(H)
+    mass, H, effects, diagonal, *joints = global_matrices(problem, ctx.prec)
+    free = mass.solve(f)
     q = add(H.transposed(free), w)
     own = add(H.sizes_transposed(free), [abs(x) for x in w])
     effect = H.times(r)
     known_r, known_l = stopping(own, diagonal, d), zeros(0)
     stop = H.sizes(stopping(own, diagonal, d, mean_square_root(q)))
     G = b = None
-    if problem.G is not None:
+    if joints:
         assert solution.l is not None
-        G, b, lam = Sparse(problem.G), balls(problem.b), balls(solution.l)
+        (G, effects_of_joints, inertia), b, lam = joints, balls(problem.b), balls(solution.l)
         velocity = add(G.sizes_transposed(free), [abs(x) for x in b])
-        inertia = mass.gram(G)
         held = [quotient(x, y) for x, y in zip(velocity, inertia, strict=True)]
         slowest = [mean_square_root(add(G.transposed(free), b))] * len(b)
         least_held = [quotient(x, y) for x, y in zip(slowest, inertia, strict=True)]
@@ -528,12 +542,12 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
         terms = add(mass.terms(free), [abs(x) for x in f])
         if G is not None:
             terms = add(terms, G.sizes(known_l))
-        rounding = [unit_of_q * x for x in add(own, mass.spread(H, terms))]
-        A: Any = H.dense()
+        rounding = [unit_of_q * x for x in add(own, spread(effects, terms))]
+        A: Any = H.dense
         by_factor: Any = doubles(effect)
         if G is not None:
-            A = np.hstack([A, G.dense()])
-        L = mass.factor()
+            A = np.hstack([A, G.dense])
+        L = mass.factor
         if L is not None:
             whole = np.linalg.solve(L, np.column_stack([A, by_factor]))
             A, by_factor = whole[:, :-1], whole[:, -1]
@@ -554,14 +568,14 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
     if solution.u is not None:
         difference = [a - b for a, b in zip(balls(solution.u), u, strict=True)]
         parts = add(H.sizes_transposed(fastest), [abs(x) for x in w])
-        allowed = parts if given or not unit else add(parts, mass.spread(H, terms))
+        allowed = parts if given or not unit else add(parts, spread(effects, terms))
         velocity = larger(contact_norms(parts, d), [mean_square_root(q)] * len(q))
         kinematics = worst(beyond(difference, allowed, unit), velocity)
     bilateral = arb(0)
     if G is not None and b is not None:
         residual = add(G.transposed(v), b)
         parts = add(G.sizes_transposed(fastest), [abs(x) for x in b])
-        allowed = add(parts, mass.spread(G, terms)) if unit else parts
+        allowed = add(parts, spread(effects_of_joints, terms)) if unit else parts
         bilateral = worst(beyond(residual, allowed, unit), larger(parts, slowest))
     rounding = rounding or zeros(len(q))
     return Terms(u, q, own, rounding, diagonal, dynamics, bilateral, kinematics)

@@ -3,11 +3,19 @@
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
+from io import BytesIO, TextIOWrapper
 from typing import Any
 from unittest.mock import patch
 
 from fclib import cli
+
+
+class Pipe(TextIOWrapper):
+    """A stream as Python opens it where a program reads what is said."""
+
+    def __init__(self, errors: str) -> None:
+        self.bytes = BytesIO()
+        super().__init__(self.bytes, "utf-8", errors, write_through=True)
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -15,12 +23,13 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = ["fclib", *map(str, arguments)]
     code: Any = 0
     with (
-        redirect_stdout(StringIO()) as out,
-        redirect_stderr(StringIO()) as err,
+        redirect_stdout(Pipe("strict")) as out,
+        redirect_stderr(Pipe("backslashreplace")) as err,
         patch.object(sys, "argv", command),
     ):
         try:
             cli.main()
         except SystemExit as end:
             code = end.code or 0
-    return subprocess.CompletedProcess(command, code, out.getvalue(), err.getvalue())
+    said = (stream.bytes.getvalue().decode() for stream in (out, err))
+    return subprocess.CompletedProcess(command, code, *said)

@@ -225,8 +225,9 @@ def assert_honest(problem: Any, result: fclib.Result, tol: float) -> None:
 # ---- the contract
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
+# all solvers of a problem in turn: the judge keeps what it knows of the last ones
 @pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("problem", PROBLEMS)
 def test_every_run_is_honest(solver: str, problem: str) -> None:
     """Solves what is easy, gives the same bits again, keeps its limits, tells what it reached."""
     easy = problem in SOLVABLE

@@ -345,6 +345,7 @@ def test_jobs_of_slurm_that_end_are_replaced(
     processes: str, way: Any, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # where the jobs leave what they say
+    monkeypatch.setattr(cluster, "LOOK", 0.5)
     chosen = campaign(tmp_path, solvers=["nsgs", "test-slow"])
     bench.run_campaign(chosen, tmp_path / "local.sqlite")
     ended: list[list[str]] = []

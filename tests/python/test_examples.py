@@ -44,7 +44,7 @@ def test_look(root: Path, tmp_path: Path) -> None:
 
 
 def test_mass_and_friction_of_a_cube_in_many_worlds(root: Path, tmp_path: Path) -> None:
-    last = run(root, tmp_path, "worlds.py").splitlines()[-2]
+    last = run(root, tmp_path, "worlds.py", 256).splitlines()[-2]
     mass, mu = (float(number) for number in re.findall(r"(?:mass|mu) ([\d.]+)", last))
     assert abs(mass - 1.7) < 0.01
     assert abs(mu - 0.35) < 0.005

@@ -219,6 +219,28 @@ def test_a_sparse_vector_is_no_matrix() -> None:
         fclib.LocalProblem(W=sp.coo_array(np.arange(3.0)), q=np.ones(3), mu=[0.5])
 
 
+@pytest.mark.parametrize(
+    "stored",
+    [
+        lambda x: x.astype(np.int64 if x.dtype.kind == "i" else np.float32),
+        lambda x: x.astype(x.dtype.newbyteorder(">")),
+        lambda x: np.repeat(x, 2)[::2],
+        lambda x: np.require(x, requirements="O").view(),
+        lambda x: np.frombuffer(x.tobytes(), x.dtype),
+        lambda x: np.ma.array(x),
+    ],
+    ids=["other type", "other bytes", "gaps", "view", "read only", "no mask"],
+)
+def test_arrays_give_the_same_problem_however_they_are_stored(stored: Any) -> None:
+    W = sp.csr_array(np.array([[2.0, 0.5, 0], [0.5, 2, 0], [0, 0, 2]]))
+    q, mu = np.array([-1.0, 0.25, 0]), np.array([0.5])
+    assert W.indices.dtype == np.int32
+    wanted = fclib.LocalProblem(W=W, q=q, mu=mu)
+    other = sp.csr_array(W)
+    other.data, other.indices, other.indptr = stored(W.data), stored(W.indices), stored(W.indptr)
+    assert fclib.LocalProblem(W=other, q=stored(q), mu=stored(mu)) == wanted
+
+
 def test_masked_entries_are_refused() -> None:
     whole = {"W": np.eye(3), "q": np.array([-1.0, 0, 0]), "mu": np.array([0.5])}
     for name in whole:

@@ -22,7 +22,7 @@ Index: TypeAlias = npt.NDArray[Any]
 def pointers(lengths: Index) -> npt.NDArray[np.int32]:
     """The pointers (k + 1) of k rows or columns stored one after the other."""
     found = np.zeros(len(lengths) + 1, dtype=np.int32)
-    np.cumsum(lengths, out=found[1:])
+    lengths.cumsum(dtype=np.int32, out=found[1:])
     return found
 
 

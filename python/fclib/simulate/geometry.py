@@ -137,7 +137,7 @@ def features(
         return np.zeros(count, np.int64)
     # both sides at once: first the first shapes, then the second ones
     which = geom.T.ravel()
-    local = on_shapes(model, contacts, geom).swapaxes(0, 1).reshape(-1, 3)
+    local = on_shapes(model, contacts.point, geom).swapaxes(0, 1).reshape(-1, 3)
     box = model.model.geom_aabb[which]
     # a place beyond a third of the half width belongs to an end
     place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
@@ -154,16 +154,15 @@ def features(
     return code + PARTS**6 * number
 
 
-def on_shapes(
-    model: MujocoModel, contacts: moreau_jean.Contacts, geom: npt.NDArray[np.int64]
-) -> Vector:
-    """The points of contacts in the frames of their two shapes (nc x 2 x 3) [m]."""
+def on_shapes(model: MujocoModel, point: Vector, geom: npt.NDArray[np.int64]) -> Vector:
+    """Points (nc x 3) of contacts in the frames of their two shapes (nc x 2 x 3) [m]."""
     d = model.data
-    arm = contacts.point[:, None] - d.geom_xpos[geom]
+    arm = point[:, None] - d.geom_xpos.take(geom, axis=0)
     if model.scene.period is not None:
         edges = np.array(model.scene.period)
         arm[..., :2] -= edges * np.rint(arm[..., :2] / edges)
-    local: Vector = np.einsum("csji,csj->csi", d.geom_xmat[geom].reshape(-1, 2, 3, 3), arm)
+    turn = d.geom_xmat.take(geom, axis=0).reshape(-1, 2, 3, 3)
+    local: Vector = np.einsum("csji,csj->csi", turn, arm)
     return local
 
 
@@ -174,10 +173,10 @@ def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contac
     """
     places = np.zeros((len(contacts), 2, 3))
     if isinstance(model, MujocoModel):
-        bodies = np.flatnonzero(contacts.pair[:, 0] >= 0)
+        bodies = (contacts.pair[:, 0] >= 0).nonzero()[0]
         if len(bodies):
-            own = contacts[bodies]
-            places[bodies] = on_shapes(model, own, own.pair)
+            points, geoms = contacts.point.take(bodies, axis=0), contacts.pair.take(bodies, axis=0)
+            places[bodies] = on_shapes(model, points, geoms)
     return places
 
 

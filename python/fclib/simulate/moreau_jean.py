@@ -327,11 +327,14 @@ class MoreauJean:
             middle = contacts.gap + 0.5 * h * before
             closed = allowances(system, h, v) if self.allowance else np.zeros(len(middle))
             active = closing(contacts.pair, middle, closed, self.activation)
-            if self.allowance:
-                active = active[ends(contacts[active], closed[active])]
             if len(active) < len(contacts):
-                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
-                before = before[active]
+                contacts = contacts[active]
+            if self.allowance:
+                outer = ends(contacts, closed[active])
+                if len(outer) < len(active):
+                    active, contacts = active[outer], contacts[outer]
+            if len(active) < len(middle):
+                H, before = submatrix(H, block_columns(active, d)), before[active]
             w_n = self.restitution * before
         else:
             middle = contacts.gap
@@ -564,22 +567,24 @@ def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
     Reactions at the others can replace a reaction between them. Between two contacts counts in any
     pair. In a pair with many points, inside of those in the same plane counts too.
     """
-    kept = contacts.pair[:, 0] < 0
-    _, group = np.unique(keys(contacts.pair), return_inverse=True)
-    counts = np.bincount(group)
-    kept |= counts[group] <= 2
-    order = np.argsort(group, kind="stable")
-    for count in np.unique(counts[counts > 2]).tolist():
-        own = order[counts[group[order]] == count].reshape(-1, count)
-        own = own[~kept[own[:, 0]]]
+    key = keys(contacts.pair)
+    order = key.argsort(kind="stable")
+    key = key.take(order)
+    starts = np.concatenate(([True], key[1:] != key[:-1], [True])).nonzero()[0]
+    counts = lengths_of(starts)
+    kept = np.ones(len(key), dtype=bool)
+    for count in set(counts[counts > 2].tolist()):
+        own = order[starts[:-1][counts == count][:, None] + np.arange(count)]
+        own = own[contacts.pair[own[:, 0], 0] >= 0]
         if count <= FACE:
             kept[own] = not_between(contacts.point[own], off[own])
             continue
+        kept[own] = False
         for one in own:
             for part in corners(contacts.point[one], contacts.frame[one, 0], off[one].max()):
                 which = one[part]
                 kept[which] = not_between(contacts.point[which[None]], off[which[None]])[0]
-    return np.flatnonzero(kept)
+    return kept.nonzero()[0]
 
 
 def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:

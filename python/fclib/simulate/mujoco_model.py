@@ -117,7 +117,15 @@ class MujocoModel:
         # vertices of meshes and heights of fields are floats of 32 bits
         single = np.isin(m.geom_type, (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD))
         single_eps = float(np.finfo(np.float32).eps)
-        self._shape_rounding = single_eps * np.where(single, m.geom_rbound, 0.0)
+        shape_rounding = single_eps * np.where(single, m.geom_rbound, 0.0)
+        self._shape_rounding = shape_rounding if single.any() else None
+        # what a geometry's margin has beside its motion: half of the activation, ...
+        self._slack = np.full(m.ngeom, 0.5 * scene.activation)
+        if self._meetings:
+            self._slack += self._meetings.alert
+        if scene.allowance:
+            # gaps that rounding opens, from the lengths that it turns
+            self._slack += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + shape_rounding)
         self._flat = bool((m.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any())
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         self._servos = Servos(m)
@@ -358,15 +366,7 @@ class MujocoModel:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
             speed = speed[self._cell.geometry]
-        reach = h * speed + h**2 * self._gravity
-        # half of the activation for each of the two geometries
-        reach += 0.5 * self.scene.activation
-        if self._meetings:
-            reach += self._meetings.alert
-        if self.scene.allowance:
-            # gaps that rounding opens, from the lengths that it turns
-            reach += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + self._shape_rounding)
-
+        reach = h * speed + h**2 * self._gravity + self._slack
         margin = np.maximum(self._margin, reach)
         m.geom_margin[:] = margin
         m.body_margin[:] = 0
@@ -396,9 +396,10 @@ class MujocoModel:
             mujoco.mj_fwdActuation(m, d)
         if m.nu and not self._servos.limited:
             force += d.qfrc_actuator
-        for body in np.flatnonzero(d.xfrc_applied.any(axis=1)):
-            push = d.xfrc_applied[body]
-            mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
+        if d.xfrc_applied.any():
+            for body in np.flatnonzero(d.xfrc_applied.any(axis=1)):
+                push = d.xfrc_applied[body]
+                mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
         if self._servos.limited:
             own, held = self._servos.within_limits(d, h, M, force)
             force += own
@@ -535,8 +536,8 @@ def gyroscopic(m: Any, d: Any) -> Sparse:
 
 def frictionless_to_frictional(d: Any) -> None:
     """Give a contact of condim 1 its tangential rows, and mu = 0: the same law, K = {r_T = 0}."""
-    frictionless = np.flatnonzero(d.contact.dim == 1)
-    if frictionless.size:
+    frictionless = d.contact.dim == 1
+    if frictionless.any():
         d.contact.dim[frictionless] = 3
         d.contact.friction[frictionless] = 0
 

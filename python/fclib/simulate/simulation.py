@@ -293,7 +293,9 @@ def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vecto
 
 def moving_part(H: Sparse, change: Vector) -> Vector:
     """The part of a change of reactions (m) that moves bodies: the least x with H x = H change."""
-    found = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
+    # SciPy's own operator of a matrix transposes it again at each product
+    products = sp.linalg.LinearOperator(H.shape, matvec=H.dot, rmatvec=H.T.dot, dtype=float)
+    found = sp.linalg.lsmr(products, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
     return np.asarray(found)
 
 
@@ -316,11 +318,12 @@ def trouble(
     stop: bool,
 ) -> str:
     """Why a simulation cannot go on after a step, in words; empty if it can."""
-    found = f"{result.solver}: {result.status}, error {result.error:.2g}"
-    if not in_range(velocity, bound):
-        return f"its velocity is out of range ({largest(velocity):.3g}; {found})"
-    if result.converged:
+    known = in_range(velocity, bound)
+    if known and result.converged:
         return ""
+    found = f"{result.solver}: {result.status}, error {result.error:.2g}"
+    if not known:
+        return f"its velocity is out of range ({largest(velocity):.3g}; {found})"
     if stop:
         return f"it was not solved ({found})"
     if result.error < NONSENSE:
@@ -384,18 +387,20 @@ def same_contacts(
     corner keeps its place on one of the shapes, so the smaller of two distances counts.
     """
     source = np.full(len(now), -1)
-    pairs, group = np.unique(keys(np.concatenate((before, now))), return_inverse=True)
-    old, new = np.split(group, [len(before)])
-    counts = [np.bincount(own, minlength=len(pairs)) for own in (old, new)]
-    order = np.argsort(old, kind="stable")
-    first = np.cumsum(counts[0]) - counts[0]
+    old, new = keys(before), keys(now)
+    order = old.argsort(kind="stable")
+    old = old.take(order)
+    first = old.searchsorted(new)
     # every old contact of its pair beside each new one
-    repeats = counts[0][new]
+    repeats = old.searchsorted(new, "right") - first
     later = np.arange(len(now)).repeat(repeats)
-    number = np.arange(len(later)) - (np.cumsum(repeats) - repeats).repeat(repeats)
-    earlier = order[first[new[later]] + number]
-    alone = (counts[0] == 1)[new[later]] & (counts[1] == 1)[new[later]]
+    number = np.arange(len(later)) - (repeats.cumsum() - repeats).repeat(repeats)
+    earlier = order[first[later] + number]
+    alone = (repeats == 1) & (np.bincount(first, repeats > 0)[first] == 1)
+    alone = alone[later]
     source[later[alone]] = earlier[alone]
+    if alone.all():
+        return source
     later, earlier = later[~alone], earlier[~alone]
     far = np.linalg.norm(places[later] - old_places[earlier], axis=2).min(axis=1)
     taken = np.zeros(len(before), dtype=bool)

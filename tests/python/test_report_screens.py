@@ -342,6 +342,30 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
 # ---- copies
 
 
+def test_all_pages_count_the_same_problems(browser: Any, site: Path) -> None:
+    """A copy is no problem of its own, on any page, also if the list is narrowed."""
+    rows = read_data(site, "catalogue")["size"]
+    known = read_data(site, "site")
+    assert known["copies"] >= 1
+    assert known["problems"] + known["copies"] == rows
+    copies = f"{known['copies']} {'copy' if known['copies'] == 1 else 'copies'}"
+    for address in ("#/overview", "#/families"):
+        page = open_page(browser, site, address, viewport=DESK)
+        assert f"{known['problems']} problems and {copies}" in page.inner_text("main")
+        page.close()
+    page = open_page(browser, site, "#/catalogue", viewport=DESK)
+    said = page.locator("main input[type=search] >> xpath=../.. >> [role=status]")
+    whole = f"{{}} of {known['problems']} problems and {{}} of {copies}"
+    assert said.inner_text() == whole.format(known["problems"], known["copies"])
+    (family,) = (one for one in known["families"] if one["copies"])
+    others = whole.format(known["problems"] - family["problems"], 0)
+    page.get_by_label("filter").fill(f"family != {family['name']}")
+    page.get_by_text(others, exact=True).wait_for()
+    page.get_by_label("filter").fill(COPY.rpartition("/")[2])
+    page.get_by_text(whole.format(0, 1), exact=True).wait_for()
+    page.close()
+
+
 def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
     browser: Any, site: Path
 ) -> None:

@@ -11,6 +11,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 import fclib
+from fclib._words import counted
 from fclib.cli._output import MeritKind, err, fail, out
 from fclib.cli._profile import With, joined
 
@@ -139,8 +140,10 @@ def command(
                 jobs=jobs,
                 progress=show,
             )
+        copies = counted(counts["copies"], "copy", "copies")
         out.print(
-            f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
+            f"{counted(counts['problems'], 'problem')}{f' and {copies}' if counts['copies'] else ''},"
+            f" {counts['runs']} runs, {counts['views']} views,"
             f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
             highlight=False,
         )

@@ -117,7 +117,7 @@ def test_the_first_screen_has_what_one_came_for(
         found = page.locator(f"main {what}").first
         found.wait_for()
         if ".plot" in what:
-            found.and_(page.locator("[data-drawn]")).wait_for()
+            found.and_(page.locator("[data-shown]")).wait_for()
         box = found.bounding_box()
         assert box is not None, what
         assert box["width"] > 0, what
@@ -258,6 +258,7 @@ def filters_closed(page: Any) -> bool:
 def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None:
     page = open_page(browser, site, "#/overview", viewport=DESK)
     plot = page.locator(".first .plot")
+    plot.hover()
     plot.and_(page.locator("[data-drawn]")).wait_for()
     names = "plot => plot.data.filter((t) => t.name && t.showlegend !== false).map((t) => t.name)"
     head = read_data(site, "site")["headlines"][-1]
@@ -268,6 +269,7 @@ def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None
     page.get_by_label("contacts").select_option("0-10")
     page.wait_for_function("/^1 instance /.test(document.querySelector('figcaption').textContent)")
     plot = page.locator(".first .plot")
+    plot.dispatch_event("pointerenter")
     plot.and_(page.locator("[data-drawn]")).wait_for()
     assert all(name.endswith(" of 1") for name in plot.evaluate(names))
     page.locator("label", has_text="tolerance").locator("select").select_option("0")
@@ -302,7 +304,7 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
     browser: Any, site: Path, collection: Path, tmp_path: Path
 ) -> None:
     page = open_page(browser, site, "#/profiles?tol=1&solvers=auto~nsgs", viewport=DESK)
-    page.locator("main .plot[data-drawn]").first.wait_for()
+    page.locator("main .plot[data-shown]").first.wait_for()
     page.get_by_text("A figure for a paper").click()
     page.get_by_label("width").select_option("2")
     texts = {}
@@ -558,8 +560,8 @@ def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Pat
     # a print waits for nothing: all is drawn when the event is over
     state = page.evaluate(
         """() => [...document.querySelectorAll("main .plot")].filter((p) => p.clientWidth)
-          .map((p) => [Boolean(p.dataset.drawn), p.clientWidth,
-            p.querySelector(".main-svg")?.getBoundingClientRect().width ?? 0])"""
+          .map((p) => ["shown" in p.dataset, p.clientWidth,
+            p.querySelector("svg")?.getBoundingClientRect().width ?? 0])"""
     )
     assert state
     for drawn, wide, svg in state:

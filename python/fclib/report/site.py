@@ -526,7 +526,7 @@ class _Writer:
             "work": rounded(
                 profiles.work_precision(campaigns.rows, campaigns.costs, weigh=WEIGH), DIGITS
             ),
-            "solvers": [_solver(label, first[label]) for label in campaigns.solvers],
+            "solvers": _with_own_keys([_solver(name, first[name]) for name in campaigns.solvers]),
         }
 
     def _put_bench(self, t: int, bench: Bench) -> None:
@@ -745,6 +745,12 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
     found["spin"] = about.get("spin", [])  # stores of earlier versions have none
     return found | {"known": about["options"]}
+
+
+def _with_own_keys(solvers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The solvers; what they cite together has one key for each entry."""
+    cites = citing.distinct([one["cite"] for one in solvers])
+    return [{**one, "cite": cite} for one, cite in zip(solvers, cites, strict=True)]
 
 
 def _use(name: str, options: Mapping[str, Any]) -> list[str]:

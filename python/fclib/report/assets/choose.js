@@ -89,10 +89,8 @@
   };
   const everyRank = (rows) => {
     const name = (r) => site().solvers[r.s].label;
-    return h(
-      "details",
-      {},
-      h("summary", {}, "All solvers by this weight"),
+    const box = h("details", {}, h("summary", {}, "All solvers by this weight"));
+    const table = () =>
       Fclib.table({
         caption:
           "Solvers with enough runs of such problems, the best first; a failure is " +
@@ -112,8 +110,9 @@
           { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved },
           { key: "mean", label: "mean [s]", type: "number" },
         ],
-      }),
-    );
+      });
+    box.addEventListener("toggle", () => box.children.length > 1 || box.append(table()));
+    return box;
   };
 
   /* the panel; changed({tol, narrowed, like, cat, bench, costs}) hears which problems are meant */

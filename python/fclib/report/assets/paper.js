@@ -36,18 +36,23 @@
     around(5, up),
   ];
 
+  /* a text as LaTeX prints it; latex_text() of fclib/bench/plots.py is the same */
   const escaped = (text) =>
     text.replace(
-      /[\\&%$#_{}^~τ×]/g,
+      /[\\&%$#_{}^~<>|τ×]/g,
       (c) =>
         ({
           "\\": "\\textbackslash{}",
           "^": "\\textasciicircum{}",
           "~": "\\textasciitilde{}",
+          "<": "\\textless{}",
+          ">": "\\textgreater{}",
+          "|": "\\textbar{}",
           τ: "$\\tau$",
           "×": "$\\times$",
         })[c] || `\\${c}`,
     );
+  Fclib.escaped = escaped;
   const round = (v) => String(Math.round(v * 100) / 100);
 
   /* pens: line(points, {colour, width, dash}), shape(points, colour),
@@ -164,7 +169,7 @@
     const height = whole || HEIGHT + legend;
     const above = height - legend; // of the curves and the axis
     const pen = (format === "pgf" ? pgfPen : svgPen)(width, height, font, ink);
-    const [left, right, top, bottom] = [34, width - 8, 6, above - 28];
+    const [left, right, top, bottom] = [options.ypercent ? 44 : 34, width - 8, 6, above - 28];
     const scale = (v) => (xlog ? Math.log10(v) : v);
     const [low, high] = xrange.map(scale);
     const px = (v) => left + ((scale(v) - low) / (high - low)) * (right - left);

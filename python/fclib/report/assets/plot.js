@@ -1,6 +1,6 @@
 // pictures, drawn when they come in sight; each with keys, a table of its numbers, and files to keep.
 // Plotly draws them. To load and to run it costs a second. So curves of a profile are first drawn
-// without it, and it draws them when a person turns to them.
+// without it, until a person turns to them.
 "use strict";
 (() => {
   const { h, number, colour } = Fclib;
@@ -141,10 +141,14 @@
       box.dataset.drawn = data.length;
       box.dataset.shown = "";
     };
-    const show = () => {
-      if (!options.first) return box.draw();
-      box.append(options.first(box.clientWidth, box.clientHeight));
+    const isSketched = () => options.first && !window.Plotly;
+    const sketch = () => {
+      box.replaceChildren(options.first(box.clientWidth, box.clientHeight));
       box.dataset.shown = "";
+    };
+    const show = () => {
+      if (!isSketched()) return box.draw();
+      sketch();
       const turned = ["pointerenter", "focus"];
       const draw = () => {
         turned.forEach((kind) => box.removeEventListener(kind, draw));
@@ -167,6 +171,10 @@
     // on paper are all charts, also those that were not in sight
     document.addEventListener("fclib-print", async () => {
       if (!box.isConnected || !box.clientWidth) return;
+      if (isSketched()) {
+        sketch();
+        return;
+      }
       await box.draw();
       await window.Plotly.relayout(box, { autosize: true });
     });

@@ -922,6 +922,13 @@ def test_every_page_is_accessible_and_no_button_asks_another_host(
         page.add_script_tag(path=script)
         for size in (WIDE, PHONE):
             page.set_viewport_size(size)
+            if size == PHONE:  # what is folded too, as the controls of a figure for a paper
+                page.evaluate(
+                    "document.querySelectorAll('main details').forEach((one) => (one.open = true))"
+                )
+                folded = page.locator("main details.paper select")
+                assert all(one.is_visible() for one in folded.all())
+                assert folded.count() >= 2 * address.startswith("#/profiles")
             page.wait_for_function(SETTLED)  # the fade is over
             found = page.evaluate(
                 "axe.run(document, { resultTypes: ['violations'], preload: false })"

@@ -181,7 +181,7 @@
     if (!options.first) (window.requestIdleCallback || setTimeout)(Fclib.plotly);
     box.addEventListener("keydown", async (event) => {
       const act = options.keys && options.keys[event.key];
-      if (!act || !box.dataset.shown) return;
+      if (!act || !("shown" in box.dataset)) return;
       event.preventDefault();
       if (!box.dataset.drawn) await box.draw();
       if (box.dataset.drawn) act(box);

@@ -140,10 +140,11 @@ def command(
                 jobs=jobs,
                 progress=show,
             )
-        copies = counted(counts["copies"], "copy", "copies")
+        told = counted(counts["problems"], "problem")
+        if counts["copies"]:
+            told += f" and {counted(counts['copies'], 'copy', 'copies')}"
         out.print(
-            f"{counted(counts['problems'], 'problem')}{f' and {copies}' if counts['copies'] else ''},"
-            f" {counts['runs']} runs, {counts['views']} views,"
+            f"{told}, {counts['runs']} runs, {counts['views']} views,"
             f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
             highlight=False,
         )

@@ -217,7 +217,9 @@
         look(s).colour,
       );
     const corners = (x, y) => {
-      const shown = x.map((v, k) => [v, y[k]]).filter(([v, share]) => share !== null && v <= xrange[1]);
+      const shown = x
+        .map((v, k) => [v, y[k]])
+        .filter(([v, share]) => share !== null && v <= xrange[1]);
       const found = shown.flatMap(([v, share], k) =>
         k
           ? [

@@ -302,7 +302,9 @@
     const stride = Math.ceil(x.length / 60);
     return Fclib.plot({
       ...options,
-      first: options.ypercent ? (...size) => Fclib.sketch({ ...options, series: own() }, size) : null,
+      first: options.ypercent
+        ? (...size) => Fclib.sketch({ ...options, series: own() }, size)
+        : null,
       height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0),
       says: `${Fclib.count(series.length, "curve")}. Left and right arrows read values.`,
       keys: {

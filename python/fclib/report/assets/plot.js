@@ -1,6 +1,6 @@
-// pictures, drawn when they come in sight; each with keys, a table of its numbers, and files to keep.
-// Plotly draws them. To load and to run it costs a second. So curves of a profile are first drawn
-// without it, until a person turns to them.
+// pictures, drawn when they come in sight; each with keys, a table of its numbers, and files to
+// keep. Plotly draws them. To load and to run it costs a second, so curves of a profile are first
+// drawn without it, until a person turns to them.
 "use strict";
 (() => {
   const { h, number, colour } = Fclib;

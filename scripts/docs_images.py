@@ -260,7 +260,7 @@ def pages(wanted: list[str], site: Path, out: Path) -> None:
             page.goto(f"{site.as_uri()}/{place}")
             plot = page.locator(part or "main .plot >> nth=0")
             plot.scroll_into_view_if_needed()
-            plot.and_(page.locator("[data-drawn]")).wait_for()
+            plot.and_(page.locator("[data-shown]")).wait_for()
             page.wait_for_timeout(1500)  # pictures in space are drawn after they are said to be
             if part:
                 plot.screenshot(path=out / f"{name}.png")

@@ -7,7 +7,7 @@ const page = [
   ...["innerWidth", "innerHeight", "devicePixelRatio", "scrollTo", "matchMedia", "print"],
   ...["addEventListener", "getComputedStyle", "getSelection", "requestAnimationFrame"],
   ...["Event", "Blob", "Response", "DecompressionStream", "IntersectionObserver"],
-  ...["ResizeObserver", "atob", "Plotly", "DataTable", "Fclib", "fclib"],
+  ...["ResizeObserver", "DOMParser", "atob", "Plotly", "DataTable", "Fclib", "fclib"],
 ];
 // of pages, workers and Node alike
 const both = [

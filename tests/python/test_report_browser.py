@@ -149,6 +149,8 @@ def draw(page: Any, plot: str = "main .plot >> nth=0", traces: int = 1) -> Any:
     """A picture, when it is drawn with at least so many traces."""
     found = page.locator(plot)
     found.scroll_into_view_if_needed()
+    found.and_(page.locator("[data-shown]")).wait_for()
+    found.dispatch_event("pointerenter")  # Plotly draws curves that a person turns to
     found.and_(page.locator("[data-drawn]")).wait_for()
     page.wait_for_function(
         "([plot, least]) => plot.data.length >= least", arg=[found.element_handle(), traces]
@@ -563,6 +565,36 @@ def test_a_large_campaign_is_browsed(browser: Any, large: Path) -> None:
     page.wait_for_selector("main[data-page=problem]")
     assert "40 runs" in page.inner_text("main")
 
+    # the first profile and the answer need neither Plotly nor the costs of all runs
+    page = go("#/overview")
+    plot = page.locator("main .first .plot[data-shown]")
+    plot.wait_for()
+    assert plot.locator("text", has_text=re.compile(r"^solver-\d\d \d+ of 1200$")).count() == 8
+    assert page.evaluate("typeof Plotly") == "undefined"
+    assert page.evaluate("Object.keys(Fclib.values).sort()") == ["catalogue", "site"]
+    # they say what the page finds in all costs
+    said = page.inner_text("main .answer")
+    ranked = page.evaluate(
+        """async () => {
+          const [bench, costs, cat, s] = await Promise.all(
+            ["t0", "t0-cpu_s", "catalogue", "site"].map(Fclib.load));
+          const names = s.solvers.map((one) => one.label);
+          const found = Fclib.ranked(bench, costs, names, cat.read.family, () => true,
+            s.charges.penalty, s);
+          return found.slice(0, 2).map((one) => [names[one.s], one.solved, one.mean]);
+        }"""
+    )
+    (best, solved, mean), (second, fewer, more) = ranked
+    for part in (f"Take {best}. It solved {solved} of 1200", f"second is {second}: {fewer} of"):
+        assert part in said
+    for value in (mean, more):
+        assert f"{value:.3g} s" in said
+    plot.hover()
+    page.locator("main .first .plot[data-drawn]").wait_for()
+    names = plot.evaluate("plot => plot.data.map((one) => one.name)")
+    assert len([name for name in names if name]) == 8
+    assert plot.locator("> svg").count() == 0
+
     page = go("#/profiles?weigh=instances")
     plot = draw(page, traces=40)
     costs = read_data(large, "t0-cpu_s")
@@ -888,6 +920,13 @@ def test_every_page_is_accessible_and_no_button_asks_another_host(
         page.add_script_tag(path=script)
         for size in (WIDE, PHONE):
             page.set_viewport_size(size)
+            if size == PHONE:  # what is folded too, as the controls of a figure for a paper
+                page.evaluate(
+                    "document.querySelectorAll('main details').forEach((one) => (one.open = true))"
+                )
+                folded = page.locator("main details.paper select")
+                assert all(one.is_visible() for one in folded.all())
+                assert folded.count() >= 2 * address.startswith("#/profiles")
             page.wait_for_function(SETTLED)  # the fade is over
             found = page.evaluate(
                 "axe.run(document, { resultTypes: ['violations'], preload: false })"

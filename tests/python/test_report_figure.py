@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import helpers_cli
-from fclib.bench import plots, profiles
-from fclib.report import write_figure
+from fclib.bench import Store, plots, profiles
+from fclib.report import ReportError, citing, figure, write_figure
 from helpers_report import add_runs, made_facts
 
 pytest.importorskip("matplotlib")
@@ -58,6 +58,54 @@ def test_a_figure_has_its_caption_and_all_that_it_cites(
     known = set(re.findall(r"^@\w+\{([^,]+),", entries, flags=re.MULTILINE))
     assert cited(caption) == known
     assert {"fclib", "fclib2014", "fclib-set-tiny", "fclib-set-hard"} < known
+
+
+NAMES = ("box_stack", "50% & more", "a#b{c}", "x^2~y\\z$", "é_ü", "a,b", "a;b", "<n|m>")
+
+
+@pytest.fixture
+def odd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A store whose solvers and sets have such names; two of them are versions of one solver."""
+    path = tmp_path / "odd.sqlite"
+    monkeypatch.setattr(figure, "SETS", dict.fromkeys(NAMES))
+    monkeypatch.setattr(citing, "SETS", {name: ("1", f"of {name}") for name in NAMES})
+    facts = [
+        dataclasses.replace(one, path=f"/there/{name}/{one.family}/{k}-local.hdf5")
+        for k, (one, name) in enumerate(zip(made_facts(len(NAMES)), NAMES, strict=True))
+    ]
+    add_runs(path, facts, NAMES, history=False)
+    with Store(path) as store:
+        store.db.execute("UPDATE solvers SET name = label, origin = 'elsewhere'")
+        store.db.execute("UPDATE solvers SET name = 'box_stack' WHERE label = 'a,b'")
+        store.seal()
+    return path
+
+
+def test_names_are_escaped_in_captions_and_are_valid_keys(odd: Path, tmp_path: Path) -> None:
+    write_figure(odd, tmp_path / "my_figure.svg", curve="data", note="100 % of them, #1")
+    caption, entries = ((tmp_path / f"my_figure.{kind}").read_text() for kind in ("tex", "bib"))
+    shown = re.sub(r"\\(cite|label|includegraphics)\{[^}]*\}", "", caption)
+    assert r"100 \% of them, \#1" in shown
+    fields = "\n".join(re.findall(r"^  \w+ = \{(.*)\},?$", entries, re.MULTILINE))
+    for name in NAMES:
+        for text in (shown, entries):
+            assert plots.latex_text(name) in text, name
+    for text in (shown, fields):
+        bare = re.sub(r"\\[&%$#_{}]", "", text)
+        assert not re.search(r"[&%$#_^<>|]", bare), bare
+        assert bare.replace("~", "").count("{") == bare.count("}")
+    keys = re.findall(r"^@\w+\{([^,]+),$", entries, flags=re.MULTILINE)
+    assert len(keys) == len(set(keys)) == entries.count("@")
+    assert all(re.fullmatch(r"[A-Za-z0-9_-]+", key) for key in keys)
+    # each of them has its own entry: solvers, sets, the software and the report
+    assert cited(caption) == set(keys)
+    assert len(keys) == 2 * len(NAMES) + 2
+    assert "fclib-solver-box_stack-2" in keys
+
+
+def test_a_file_that_tex_cannot_name_is_refused(store: Path, tmp_path: Path) -> None:
+    with pytest.raises(ReportError, match=r"50%\.pdf: TeX needs a name of letters"):
+        write_figure(store, tmp_path / "50%.pdf")
 
 
 def test_a_figure_is_of_the_chosen_runs(store: Path, tmp_path: Path) -> None:

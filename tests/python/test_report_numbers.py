@@ -267,6 +267,7 @@ def test_overview_and_profiles_agree(site: Path, page: Any) -> None:
     known = read_data(site, "site")
     for t, head in enumerate(known["headlines"]):
         page.goto((site / "index.html").as_uri() + f"#/profiles?tol={t}")
+        page.hover("main .plot[data-shown]")
         page.wait_for_selector("main .plot[data-drawn]")
         shown = page.evaluate("document.querySelector('main .plot').data.map((one) => one.name)")
         assert sorted(shown) == sorted(head["legend"])
@@ -293,6 +294,7 @@ def test_the_overview_draws_the_chosen_problems_as_python_does(
             page.goto((site / "index.html").as_uri() + "#/about")
             page.wait_for_selector("main[data-page=about]")
             page.goto((site / "index.html").as_uri() + f"#/overview?tol={t}&size={size}")
+            page.hover("main[data-page=overview] .first .plot[data-shown]")
             page.wait_for_selector("main[data-page=overview] .first .plot[data-drawn]")
             drawn = page.evaluate(
                 "document.querySelector('.first .plot').data.map((one) => "

@@ -117,7 +117,7 @@ def test_the_first_screen_has_what_one_came_for(
         found = page.locator(f"main {what}").first
         found.wait_for()
         if ".plot" in what:
-            found.and_(page.locator("[data-drawn]")).wait_for()
+            found.and_(page.locator("[data-shown]")).wait_for()
         box = found.bounding_box()
         assert box is not None, what
         assert box["width"] > 0, what
@@ -258,6 +258,7 @@ def filters_closed(page: Any) -> bool:
 def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None:
     page = open_page(browser, site, "#/overview", viewport=DESK)
     plot = page.locator(".first .plot")
+    plot.hover()
     plot.and_(page.locator("[data-drawn]")).wait_for()
     names = "plot => plot.data.filter((t) => t.name && t.showlegend !== false).map((t) => t.name)"
     head = read_data(site, "site")["headlines"][-1]
@@ -268,6 +269,7 @@ def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None
     page.get_by_label("contacts").select_option("0-10")
     page.wait_for_function("/^1 instance /.test(document.querySelector('figcaption').textContent)")
     plot = page.locator(".first .plot")
+    plot.dispatch_event("pointerenter")
     plot.and_(page.locator("[data-drawn]")).wait_for()
     assert all(name.endswith(" of 1") for name in plot.evaluate(names))
     page.locator("label", has_text="tolerance").locator("select").select_option("0")
@@ -302,7 +304,7 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
     browser: Any, site: Path, collection: Path, tmp_path: Path
 ) -> None:
     page = open_page(browser, site, "#/profiles?tol=1&solvers=auto~nsgs", viewport=DESK)
-    page.locator("main .plot[data-drawn]").first.wait_for()
+    page.locator("main .plot[data-shown]").first.wait_for()
     page.get_by_text("A figure for a paper").click()
     page.get_by_label("width").select_option("2")
     texts = {}
@@ -340,6 +342,30 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
 
 
 # ---- copies
+
+
+def test_all_pages_count_the_same_problems(browser: Any, site: Path) -> None:
+    """A copy is no problem of its own, on any page, also if the list is narrowed."""
+    rows = read_data(site, "catalogue")["size"]
+    known = read_data(site, "site")
+    assert known["copies"] >= 1
+    assert known["problems"] + known["copies"] == rows
+    copies = f"{known['copies']} {'copy' if known['copies'] == 1 else 'copies'}"
+    for address in ("#/overview", "#/families"):
+        page = open_page(browser, site, address, viewport=DESK)
+        assert f"{known['problems']} problems and {copies}" in page.inner_text("main")
+        page.close()
+    page = open_page(browser, site, "#/catalogue", viewport=DESK)
+    said = page.locator("main input[type=search] >> xpath=../.. >> [role=status]")
+    whole = f"{{}} of {known['problems']} problems and {{}} of {copies}"
+    assert said.inner_text() == whole.format(known["problems"], known["copies"])
+    (family,) = (one for one in known["families"] if one["copies"])
+    others = whole.format(known["problems"] - family["problems"], 0)
+    page.get_by_label("filter").fill(f"family != {family['name']}")
+    page.get_by_text(others, exact=True).wait_for()
+    page.get_by_label("filter").fill(COPY.rpartition("/")[2])
+    page.get_by_text(whole.format(0, 1), exact=True).wait_for()
+    page.close()
 
 
 def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
@@ -534,8 +560,8 @@ def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Pat
     # a print waits for nothing: all is drawn when the event is over
     state = page.evaluate(
         """() => [...document.querySelectorAll("main .plot")].filter((p) => p.clientWidth)
-          .map((p) => [Boolean(p.dataset.drawn), p.clientWidth,
-            p.querySelector(".main-svg")?.getBoundingClientRect().width ?? 0])"""
+          .map((p) => ["shown" in p.dataset, p.clientWidth,
+            p.querySelector("svg")?.getBoundingClientRect().width ?? 0])"""
     )
     assert state
     for drawn, wide, svg in state:

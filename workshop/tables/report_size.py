@@ -27,7 +27,7 @@ from fclib.report import Campaigns, build_site
 from workshop.tables import _results
 
 # the data that a page loads
-PARTS = {"overview": ("site", "catalogue", "t0", "t0-cpu_s"), "catalogue": ("site", "catalogue")}
+PARTS = {"overview": ("site", "catalogue"), "catalogue": ("site", "catalogue")}
 REPEATS = 5  # times that each page is opened
 CATALOGUE = "catalogue"
 FILTERS = ("contacts > 500", "contacts > 500 and solver-07")
@@ -99,11 +99,11 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
 
     marks = {
         "overview, which solver to take": ("#/overview", "main .answer a"),
-        "overview, its first profile": ("#/overview", "main .plot[data-drawn]"),
+        "overview, its first profile": ("#/overview", "main .plot[data-shown]"),
         CATALOGUE: ("#/catalogue", "main table tbody tr"),
         "a problem": ("#/problem/Family1/00001", "main table tbody tr"),
         "profiles, their table of statuses": ("#/profiles", "main table tbody tr"),
-        "profiles, their curves": ("#/profiles", "main .plot[data-drawn]"),
+        "profiles, their curves": ("#/profiles", "main .plot[data-shown]"),
     }
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)
 

@@ -47,6 +47,7 @@ KINDS_OF_FONTS = ("sans-serif", "serif", "monospace")
 ESCAPES = str.maketrans(
     {character: f"\\{character}" for character in "&%$#_{}"}
     | {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}"}
+    | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
 )
 TEX = ("lualatex", "xelatex", "pdflatex")  # any of them measures the texts of PGF
 ENDS = 1e4  # largest ratio that is shown

@@ -11,6 +11,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 import fclib
+from fclib._words import counted
 from fclib.cli._output import MeritKind, err, fail, out
 from fclib.cli._profile import With, joined
 
@@ -139,8 +140,11 @@ def command(
                 jobs=jobs,
                 progress=show,
             )
+        told = counted(counts["problems"], "problem")
+        if counts["copies"]:
+            told += f" and {counted(counts['copies'], 'copy', 'copies')}"
         out.print(
-            f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
+            f"{told}, {counts['runs']} runs, {counts['views']} views,"
             f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
             highlight=False,
         )

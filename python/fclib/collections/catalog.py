@@ -282,7 +282,7 @@ def with_copies(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     first: dict[str, str] = {}
     found = []
     for row in rows:
-        original = first.setdefault(row["digest"], row["id"])
+        original = first.setdefault(_data_of(row), row["id"])
         found.append({**row, "same_as": None if original == row["id"] else original})
     return found
 
@@ -305,7 +305,12 @@ def is_solved(row: Mapping[str, Any]) -> bool:
 
 def distinct(rows: Iterable[Mapping[str, Any]]) -> int:
     """How many different problems there are."""
-    return len({row["digest"] for row in rows})
+    return len({_data_of(row) for row in rows})
+
+
+def _data_of(row: Mapping[str, Any]) -> str:
+    """What equal problems share; a catalogue of somebody else's may have no digests."""
+    return str(row["digest"] or row["id"])
 
 
 def _require_inside(file: Path, table: Any, name: str) -> None:

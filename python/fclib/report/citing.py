@@ -8,9 +8,10 @@ only if a second source gives it for that paper: a page without a link is better
 from __future__ import annotations
 
 import functools
+import hashlib
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -119,20 +120,58 @@ def set_of_problems(name: str) -> str:
 def problem() -> str:
     """BibTeX of a problem, with {id}, {key}, {version} and {digest} to fill in."""
     note = ["version {version}", "fclib.digest {digest}", f"FCLIB {_core.version}"]
-    return entry("problem", "{key}", "Frictional contact problem {id}", note)
+    return _entry("problem-{key}", "Frictional contact problem {id}", note)
 
 
 def implementation(name: str, title: str, version: str) -> str:
     """BibTeX of a solver: of its version here, or of its origin."""
-    note = latex_text(version or f"FCLIB {_core.version}")
-    return entry("solver", name, latex_text(f"{title or name}: solver {name}"), [note])
+    note = version or f"FCLIB {_core.version}"
+    return entry("solver", name, f"{title or name}: solver {name}", [note])
 
 
-def entry(kind: str, name: str, title: str, note: list[str]) -> str:
-    """An entry of BibTeX by the developers."""
-    key = re.sub(r"[^\w{}-]+", "-", name)
+def entry(kind: str, name: str, title: str, note: Sequence[str]) -> str:
+    """An entry of BibTeX by the developers, of plain texts."""
+    return _entry(f"{kind}-{key_for(name)}", latex_text(title), [latex_text(part) for part in note])
+
+
+def key_for(name: str) -> str:
+    r"""A name as a key of BibTeX, which \cite takes too: ASCII letters, digits, - and _."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    key = re.sub(r"[^A-Za-z0-9_-]+", "-", plain)
+    if re.fullmatch(r"[A-Za-z0-9_/ -]+", name):
+        return key
+    # names that differ in other characters alone have different keys
+    return f"{key}-{hashlib.sha256(name.encode()).hexdigest()[:6]}"
+
+
+def key_of(entry: str) -> str:
+    """The key of an entry of BibTeX."""
+    return entry.partition("{")[2].partition(",")[0].strip()
+
+
+def distinct(lists: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Lists of entries in which no two different ones have the same key.
+
+    Two versions of one solver are two entries; the key of the second then ends in -2.
+    """
+    known: dict[str, str] = {}  # by the entry as it was given
+    taken: set[str] = set()
+    for entry in (one for entries in lists for one in entries):
+        if entry in known:
+            continue
+        key = own = key_of(entry)
+        count = 1
+        while own in taken:
+            count += 1
+            own = f"{key}-{count}"
+        taken.add(own)
+        known[entry] = entry.replace(key, own, 1)
+    return [[known[entry] for entry in entries] for entries in lists]
+
+
+def _entry(key: str, title: str, note: Sequence[str]) -> str:
     return (
-        f"@misc{{fclib-{kind}-{key},\n"
+        f"@misc{{fclib-{key},\n"
         "  author = {{The FCLIB developers}},\n"
         f"  title = {{{title}}},\n"
         f"  note = {{{', '.join(note)}}}\n"

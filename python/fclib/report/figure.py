@@ -7,6 +7,7 @@ curves.bib    what the caption cites
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -27,6 +28,7 @@ CURVES: Mapping[str, str] = {
     "accuracy": "Cost of an accuracy",
 }
 FORMATS = (".pdf", ".svg", ".pgf")
+READABLE = re.compile(r"[\w .+-]+")  # names of files that TeX can be told
 
 
 def write_figure(
@@ -68,13 +70,16 @@ def write_figure(
             smallest is drawn, except for the cost of an accuracy.
 
     Raises:
-        ReportError: the format is not known, or there is nothing to draw.
+        ReportError: the format is not known, TeX could not read the file by its name, or there is
+            nothing to draw.
         ProfileError: there is nothing to compare.
         ValueError: the font is not known, or PGF finds no TeX.
         ImportError: Matplotlib is not there.
     """
     if path.suffix not in FORMATS:
         raise ReportError(f"{path}: a figure ends in {', '.join(FORMATS)}")
+    if not READABLE.fullmatch(path.name):
+        raise ReportError(f"{path}: TeX needs a name of letters, digits, blanks and . _ + -")
     rows = profiles.load(store, solvers=solvers, **chosen)
     every = profiles.gather(rows, metric, count_unsuitable, both_forms)
     costs = comparison.compared(every, solvers or None, own_set)
@@ -103,7 +108,8 @@ def write_figure(
         else "",
         note,
     ]
-    named = cited_solvers(runs) | cited_sets(runs) | cited_software()
+    cited = cited_solvers(runs) | cited_sets(runs) | cited_software()
+    named = dict(zip(cited, citing.distinct(list(cited.values())), strict=True))
     texts = {
         ".tex": environment(path, columns, CURVES[curve], [word for word in words if word], named),
         ".bib": "\n\n".join(dict.fromkeys(entry for own in named.values() for entry in own)) + "\n",
@@ -126,7 +132,7 @@ def environment(
         rf"\input{{{path.name}}}" if path.suffix == ".pgf" else rf"\includegraphics{{{path.stem}}}"
     )
     cites = [
-        rf"{latex_text(name)}~\cite{{{','.join(map(key_of, entries))}}}"
+        rf"{latex_text(name)}~\cite{{{','.join(map(citing.key_of, entries))}}}"
         for name, entries in named.items()
     ]
     return "\n".join(
@@ -141,11 +147,6 @@ def environment(
             "",
         ]
     )
-
-
-def key_of(entry: str) -> str:
-    """The key of an entry of BibTeX."""
-    return entry.partition("{")[2].partition(",")[0].strip()
 
 
 # ---- what is cited: entries of BibTeX, by a name

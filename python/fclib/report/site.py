@@ -39,6 +39,7 @@ from fclib.bench.plots import COLOURS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.bench.table import object_in
 from fclib.collections import families, ratings, read_catalog, sets
+from fclib.collections.catalog import with_copies
 from fclib.collections.figures import MEASURES, bins_of, is_whole
 from fclib.collections.set_index import SETS, kind_of, version
 from fclib.report import browser, citing, downloads, drawings
@@ -185,7 +186,8 @@ def build_site(
         progress: called with the name of the work, the number done and the total.
 
     Returns:
-        The numbers of problems, runs, views and bytes in the site, and the bytes of the module.
+        The numbers of different problems, their copies, runs, views and bytes in the site, and the
+        bytes of the module.
 
     Raises:
         ReportError: there is nothing to show, `out` holds other files, or a library is not
@@ -236,11 +238,10 @@ class Problems:
         self.folder = None
         if catalogue is not None:
             self.folder = catalogue if catalogue.is_dir() else catalogue.parent
-            self.rows = read_catalog(catalogue).to_pylist()
+            self.rows = with_copies(read_catalog(catalogue).to_pylist())
             for row in self.rows:
                 self.files.append(self.folder / (row["global_file"] or row["local_file"]))
                 self.digests.append(row["digest"])
-            self._mark_copies()
         if campaigns is not None:
             self._add_runs(campaigns)
         known = families()
@@ -253,14 +254,6 @@ class Problems:
                 # a local problem does not know its bodies
                 row |= {"n": None, "density": None}
         self.ratings = self._rate()
-
-    def _mark_copies(self) -> None:
-        """Name the first problem with the same data, of each other one."""
-        first: dict[str, str] = {}
-        for row in self.rows:
-            # a catalogue of somebody else's may have no digests
-            original = first.setdefault(row["digest"] or row["id"], row["id"])
-            row["same_as"] = None if original == row["id"] else original
 
     def share(self) -> None:
         """Give what the runs say of a problem to its copies too."""
@@ -477,7 +470,7 @@ class _Writer:
         self.put("catalogue", {"size": len(self.problems.rows), "columns": self.problems.columns()})
         self.put("site", site)
         return {
-            "problems": len(self.problems.rows),
+            **_numbers(self.problems.rows),
             "runs": len(self.campaigns.rows) if self.campaigns is not None else 0,
             "views": views,
             "bytes": self.bytes,
@@ -533,7 +526,7 @@ class _Writer:
             "work": rounded(
                 profiles.work_precision(campaigns.rows, campaigns.costs, weigh=WEIGH), DIGITS
             ),
-            "solvers": [_solver(label, first[label]) for label in campaigns.solvers],
+            "solvers": _with_own_keys([_solver(name, first[name]) for name in campaigns.solvers]),
         }
 
     def _put_bench(self, t: int, bench: Bench) -> None:
@@ -651,7 +644,10 @@ def _histograms(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _numbers(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """How many different problems there are, and how many copies of these or of others."""
+    """How many different problems there are, and how many copies of these or of others.
+
+    `Fclib.tally` of the pages counts the same in what a reader has chosen.
+    """
     copies = sum(bool(row.get("same_as")) for row in rows)
     return {"problems": len(rows) - copies, "copies": copies}
 
@@ -749,6 +745,12 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
     found["spin"] = about.get("spin", [])  # stores of earlier versions have none
     return found | {"known": about["options"]}
+
+
+def _with_own_keys(solvers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The solvers; what they cite together has one key for each entry."""
+    cites = citing.distinct([one["cite"] for one in solvers])
+    return [{**one, "cite": cite} for one, cite in zip(solvers, cites, strict=True)]
 
 
 def _use(name: str, options: Mapping[str, Any]) -> list[str]:

@@ -41,6 +41,18 @@
       .sort((a, b) => a.mean - b.mean);
   };
 
+  /* the same of all problems, as Python has summed it; null if it has not */
+  const stored = (t, charge) => {
+    const s = site();
+    const head = s.headlines[t];
+    if (!head || charge !== s.charges.penalty) return null;
+    const places = new Map(s.solvers.map((one, k) => [one.label, k]));
+    return head.tables[""]
+      .filter((row) => places.has(row.solver))
+      .map((row) => ({ ...row, s: places.get(row.solver) }))
+      .sort((a, b) => a.mean - b.mean);
+  };
+
   /* which problems are meant: of a set, of a kind, of a size */
   const meant = ({ set, kind, size }, { read }) => {
     const [from, end] = size
@@ -77,10 +89,8 @@
   };
   const everyRank = (rows) => {
     const name = (r) => site().solvers[r.s].label;
-    return h(
-      "details",
-      {},
-      h("summary", {}, "All solvers by this weight"),
+    const box = h("details", {}, h("summary", {}, "All solvers by this weight"));
+    const table = () =>
       Fclib.table({
         caption:
           "Solvers with enough runs of such problems, the best first; a failure is " +
@@ -100,8 +110,9 @@
           { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved },
           { key: "mean", label: "mean [s]", type: "number" },
         ],
-      }),
-    );
+      });
+    box.addEventListener("toggle", () => box.children.length > 1 || box.append(table()));
+    return box;
   };
 
   /* the panel; changed({tol, narrowed, like, cat, bench, costs}) hears which problems are meant */
@@ -119,23 +130,29 @@
     let turn = 0;
     const draw = async () => {
       const own = ++turn;
-      const [cat, bench, costs] = await Promise.all([
-        catalogue(),
-        load(`t${state.tol}`),
-        load(`t${state.tol}-cpu_s`),
-      ]);
-      if (own !== turn) return;
-      const like = meant(state, cat);
-      const names = s.solvers.map((one) => one.label);
-      const rows = Fclib.ranked(bench, costs, names, cat.read.family, like, 10 ** state.weight, s);
+      const narrowed = Boolean(state.set || state.kind || state.size);
+      const charge = 10 ** state.weight;
+      let rows = narrowed ? null : stored(state.tol, charge);
+      let found = { tol: state.tol, narrowed };
+      if (!rows) {
+        const [cat, bench, costs] = await Promise.all([
+          catalogue(),
+          load(`t${state.tol}`),
+          load(`t${state.tol}-cpu_s`),
+        ]);
+        if (own !== turn) return;
+        const like = meant(state, cat);
+        const names = s.solvers.map((one) => one.label);
+        rows = Fclib.ranked(bench, costs, names, cat.read.family, like, charge, s);
+        found = { ...found, like, cat, bench, costs };
+      }
       says.replaceChildren(
         ...(rows.length
           ? answer(rows, state)
           : ["No problem like that was run to this tolerance by solvers that compare."]),
       );
       table.replaceChildren(...(rows.length ? [everyRank(rows)] : []));
-      const narrowed = Boolean(state.set || state.kind || state.size);
-      changed({ tol: state.tol, narrowed, like, cat, bench, costs });
+      changed(found);
     };
     const change = (key) => (value) => {
       state[key] = ["tol", "weight"].includes(key) ? Number(value) : value;
@@ -170,8 +187,8 @@
       const all = (key) => (cat.read[key] ? cat.rows.map((row) => row[key]) : []);
       fill(sets, "set", "set", all("collection"));
       fill(kinds, "kind", "kind", all("kind"));
-      return draw();
     });
+    draw();
     return h(
       "section",
       { class: "panel" },

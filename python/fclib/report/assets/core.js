@@ -166,6 +166,12 @@ Fclib.tolerance = (tol) =>
 // "1 family", "2 families"
 Fclib.count = (number, one, many = `${one}s`) => `${number} ${number === 1 ? one : many}`;
 
+/* how many of some rows of the catalogue are different problems, and how many are copies: as
+   _numbers() of fclib/report/site.py, which counts the whole site and its families */
+Fclib.tally = (rows) => {
+  const copies = rows.filter((row) => row.same_as).length;
+  return { problems: rows.length - copies, copies };
+};
 /* different problems; those with the data of another one are told apart */
 Fclib.problems = ({ problems, copies }) =>
   Fclib.count(problems, "problem") +

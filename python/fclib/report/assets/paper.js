@@ -36,23 +36,28 @@
     around(5, up),
   ];
 
+  /* a text as LaTeX prints it; latex_text() of fclib/bench/plots.py is the same */
   const escaped = (text) =>
     text.replace(
-      /[\\&%$#_{}^~τ×]/g,
+      /[\\&%$#_{}^~<>|τ×]/g,
       (c) =>
         ({
           "\\": "\\textbackslash{}",
           "^": "\\textasciicircum{}",
           "~": "\\textasciitilde{}",
+          "<": "\\textless{}",
+          ">": "\\textgreater{}",
+          "|": "\\textbar{}",
           τ: "$\\tau$",
           "×": "$\\times$",
         })[c] || `\\${c}`,
     );
+  Fclib.escaped = escaped;
   const round = (v) => String(Math.round(v * 100) / 100);
 
   /* pens: line(points, {colour, width, dash}), shape(points, colour),
      text(x, y, text, {anchor, turned, power}); whole() is the text of the file */
-  const svgPen = (width, height, font) => {
+  const svgPen = (width, height, font, ink) => {
     const parts = [];
     const clean = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
     const points = (list) => list.map((p) => p.map(round).join(",")).join(" ");
@@ -62,7 +67,11 @@
           `<polyline points="${points(list)}" fill="none" stroke="${colour}" stroke-width="${w}"` +
             `${dash.length ? ` stroke-dasharray="${dash.join(" ")}"` : ""}/>`,
         ),
-      shape: (list, colour) => parts.push(`<polygon points="${points(list)}" fill="${colour}"/>`),
+      shape: (list, colour, opacity = 1) =>
+        parts.push(
+          `<polygon points="${points(list)}" fill="${colour}"` +
+            `${opacity < 1 ? ` fill-opacity="${opacity}"` : ""}/>`,
+        ),
       text: (x, y, text, { anchor = "start", turned, power } = {}) =>
         parts.push(
           `<text x="${round(x)}" y="${round(y)}" text-anchor="${anchor}"` +
@@ -72,7 +81,7 @@
       whole: () =>
         `<svg xmlns="http://www.w3.org/2000/svg" width="${round(width)}pt" ` +
         `height="${round(height)}pt" viewBox="0 0 ${round(width)} ${round(height)}" ` +
-        `font-family="${FONTS[font]}" font-size="${SIZE}" fill="${INK}">\n` +
+        `font-family="${FONTS[font]}" font-size="${SIZE}" fill="${ink}">\n` +
         `${parts.join("\n")}\n</svg>\n`,
     };
   };
@@ -143,24 +152,29 @@
       .map((v) => ({ v, text: String(Number(v.toPrecision(3))) }));
   };
 
-  /* options: series [{legend, x, y, style}] of steps, colours, xlog, xrange, xlabel, ylabel */
-  Fclib.draw = (options, { format, columns, font }) => {
+  /* options: series [{legend, x, y, style, band: [low, high]}] of steps, colours, xlog, xrange,
+     xlabel, ylabel; whole: its height, or that of a figure for a paper */
+  Fclib.draw = (
+    options,
+    { format, columns, font, width = WIDTHS[columns], whole, ink = INK, grid = GRID },
+  ) => {
     const { series, xlog, xrange, xlabel, ylabel } = options;
-    const width = WIDTHS[columns];
     const longest = Math.max(...series.map((s) => s.legend.length));
     const across = Math.max(
       1,
       Math.min(series.length, Math.floor((width - 20) / (34 + 4.4 * longest))),
     );
     const lines = Math.ceil(series.length / across);
-    const height = HEIGHT + 11 * lines + 3;
-    const pen = (format === "pgf" ? pgfPen : svgPen)(width, height, font);
-    const [left, right, top, bottom] = [34, width - 8, 6, HEIGHT - 28];
+    const legend = 11 * lines + 3;
+    const height = whole || HEIGHT + legend;
+    const above = height - legend; // of the curves and the axis
+    const pen = (format === "pgf" ? pgfPen : svgPen)(width, height, font, ink);
+    const [left, right, top, bottom] = [options.ypercent ? 44 : 34, width - 8, 6, above - 28];
     const scale = (v) => (xlog ? Math.log10(v) : v);
     const [low, high] = xrange.map(scale);
     const px = (v) => left + ((scale(v) - low) / (high - low)) * (right - left);
     const py = (share) => bottom - (share / 1.02) * (bottom - top);
-    const thin = { colour: GRID, width: 0.3 };
+    const thin = { colour: grid, width: 0.3 };
     for (const { v, text, power } of ticksOf(xrange, xlog)) {
       pen.line(
         [
@@ -179,7 +193,8 @@
         ],
         thin,
       );
-      pen.text(left - 4, py(share) + 3, share.toFixed(1), { anchor: "end" });
+      const text = options.ypercent ? `${100 * share} %` : share.toFixed(1);
+      pen.text(left - 4, py(share) + 3, text, { anchor: "end" });
     }
     pen.line(
       [
@@ -187,7 +202,7 @@
         [left, bottom],
         [right, bottom],
       ],
-      { colour: INK, width: 0.6 },
+      { colour: ink, width: 0.6 },
     );
     pen.text((left + right) / 2, bottom + 22, xlabel, { anchor: "middle" });
     pen.text(10, (top + bottom) / 2, ylabel, { anchor: "middle", turned: true });
@@ -201,9 +216,11 @@
         SHAPES[s.style % SHAPES.length].map(([dx, dy]) => [x + 2.4 * dx, y + 2.4 * dy]),
         look(s).colour,
       );
-    series.forEach((s, place) => {
-      const shown = s.x.map((v, k) => [v, s.y[k]]).filter(([v]) => v <= xrange[1]);
-      const corners = shown.flatMap(([v, share], k) =>
+    const corners = (x, y) => {
+      const shown = x
+        .map((v, k) => [v, y[k]])
+        .filter(([v, share]) => share !== null && v <= xrange[1]);
+      const found = shown.flatMap(([v, share], k) =>
         k
           ? [
               [px(v), py(shown[k - 1][1])],
@@ -211,8 +228,15 @@
             ]
           : [[px(v), py(share)]],
       );
-      const end = shown[shown.length - 1];
-      pen.line([...corners, [right, py(end[1])]], look(s));
+      if (found.length) found.push([right, found[found.length - 1][1]]);
+      return found;
+    };
+    for (const s of series.filter((one) => one.band)) {
+      const [under, over] = s.band.map((y) => corners(s.x, y));
+      pen.shape([...under, ...over.reverse()], look(s).colour, 0.15);
+    }
+    series.forEach((s, place) => {
+      pen.line(corners(s.x, s.y), look(s));
       for (let k = 0; k < MARKS; k++) {
         const t = (k + 0.2 + 0.6 * ((place % 4) / 4)) / MARKS;
         const v = xlog ? 10 ** (low + t * (high - low)) : low + t * (high - low);
@@ -222,7 +246,7 @@
     });
     series.forEach((s, k) => {
       const x = left + (k % across) * ((right - left) / across);
-      const y = HEIGHT + 7 + 11 * Math.floor(k / across);
+      const y = above + 7 + 11 * Math.floor(k / across);
       pen.line(
         [
           [x, y],
@@ -236,6 +260,29 @@
     return { text: pen.whole(), width, height };
   };
 
+  /* curves on a page: in the colours of its theme, as large as a place of so many pixels */
+  Fclib.sketch = (options, [width, height]) => {
+    const unit = 13 / SIZE; // pixels, so that letters are as large as those of the page
+    const series = options.series.map((s, k) => ({
+      ...s,
+      legend: s.legend || s.name,
+      style: s.style ?? k,
+    }));
+    const { text } = Fclib.draw(
+      { ...options, series, colours: [...Array(7)].map((_, k) => `var(--c${k})`) },
+      {
+        font: "sans",
+        width: width / unit,
+        whole: height / unit,
+        ink: "var(--text)",
+        grid: "var(--line)",
+      },
+    );
+    const drawn = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
+    Fclib.set(drawn, { width: "100%", height: "100%", "aria-hidden": "true" });
+    drawn.removeAttribute("font-family");
+    return drawn;
+  };
   /* the figure in LaTeX: cites [[name, [BibTeX]]] */
   const environment = (name, { columns, format }, { title, words, cites }) => {
     const kind = columns === 2 ? "figure*" : "figure";

@@ -1,5 +1,6 @@
-// pictures by Plotly, drawn when they come in sight; each with keys, a table of its numbers, and
-// files to keep
+// pictures, drawn when they come in sight; each with keys, a table of its numbers, and files to
+// keep. Plotly draws them. To load and to run it costs a second, so curves of a profile are first
+// drawn without it, until a person turns to them.
 "use strict";
 (() => {
   const { h, number, colour } = Fclib;
@@ -96,7 +97,8 @@
 
   /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it
      knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
-     still: no tools and no table */
+     still: no tools and no table, first(width, height): a drawing that needs no library
+     The box has data-shown if anything is drawn, and data-drawn if Plotly has drawn it. */
   Fclib.plot = (options) => {
     const { title } = options;
     const name = options.name.replaceAll("/", "-");
@@ -117,6 +119,7 @@
       const Plotly = await Fclib.plotly();
       if (!box.isConnected) return;
       const { data, layout } = options.draw();
+      if (!box.dataset.drawn) box.replaceChildren(); // without the first drawing
       await Plotly.react(
         box,
         data,
@@ -136,12 +139,29 @@
           location.hash = options.href(point);
         });
       box.dataset.drawn = data.length;
+      box.dataset.shown = "";
+    };
+    const isSketched = () => options.first && !window.Plotly;
+    const sketch = () => {
+      box.replaceChildren(options.first(box.clientWidth, box.clientHeight));
+      box.dataset.shown = "";
+    };
+    const show = () => {
+      if (!isSketched()) return box.draw();
+      sketch();
+      const turned = ["pointerenter", "focus"];
+      const draw = () => {
+        turned.forEach((kind) => box.removeEventListener(kind, draw));
+        return box.draw();
+      };
+      turned.forEach((kind) => box.addEventListener(kind, draw));
+      return null;
     };
     new IntersectionObserver(
       (seen, watcher) => {
         if (!seen.some((one) => one.isIntersecting)) return;
         watcher.disconnect();
-        box.draw();
+        show();
       },
       { rootMargin: "300px" },
     ).observe(box);
@@ -151,15 +171,20 @@
     // on paper are all charts, also those that were not in sight
     document.addEventListener("fclib-print", async () => {
       if (!box.isConnected || !box.clientWidth) return;
+      if (isSketched()) {
+        sketch();
+        return;
+      }
       await box.draw();
       await window.Plotly.relayout(box, { autosize: true });
     });
-    (window.requestIdleCallback || setTimeout)(Fclib.plotly);
-    box.addEventListener("keydown", (event) => {
+    if (!options.first) (window.requestIdleCallback || setTimeout)(Fclib.plotly);
+    box.addEventListener("keydown", async (event) => {
       const act = options.keys && options.keys[event.key];
-      if (!act || !box.dataset.drawn) return;
+      if (!act || !("shown" in box.dataset)) return;
       event.preventDefault();
-      act(box);
+      if (!box.dataset.drawn) await box.draw();
+      if (box.dataset.drawn) act(box);
     });
     const figure = (...parts) => Object.assign(h("figure", {}, ...parts), { plot: box });
     if (options.still) return figure(box, options.note && h("figcaption", {}, options.note));
@@ -236,6 +261,14 @@
       });
     else if (x[x.length - 1] < high && !options.ends) x.push(high);
     const curves = series.map((s) => ({ ...s, y: x.map((v) => Fclib.at(s, v)) }));
+    const banded = curves
+      .filter((s) => s.band)
+      .slice(0, BANDED)
+      .map((s) => [s, s.band.map((y) => x.map((v) => Fclib.at({ x: s.x, y }, v)))]);
+    const own = () => {
+      const bands = new Map(banded);
+      return curves.map((s) => ({ ...s, x, band: bands.get(s) }));
+    };
     const log = (range, on) => (on ? range.map(Math.log10) : range);
     // the legend: as many columns as the longest name leaves room for
     const width =
@@ -269,6 +302,9 @@
     const stride = Math.ceil(x.length / 60);
     return Fclib.plot({
       ...options,
+      first: options.ypercent
+        ? (...size) => Fclib.sketch({ ...options, series: own() }, size)
+        : null,
       height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0),
       says: `${Fclib.count(series.length, "curve")}. Left and right arrows read values.`,
       keys: {
@@ -305,23 +341,20 @@
               ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}`
               : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
           })),
-          ...curves
-            .filter((s) => s.band)
-            .slice(0, BANDED)
-            .flatMap((s, k) =>
-              s.band.map((y, side) => ({
-                type: "scatter",
-                mode: "lines",
-                x,
-                y: x.map((v) => Fclib.at({ x: s.x, y }, v)),
-                line: { width: 0, shape: "hv" },
-                hoverinfo: "skip",
-                showlegend: false,
-                ...(side
-                  ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` }
-                  : {}),
-              })),
-            ),
+          ...banded.flatMap(([s, band], k) =>
+            band.map((y, side) => ({
+              type: "scatter",
+              mode: "lines",
+              x,
+              y,
+              line: { width: 0, shape: "hv" },
+              hoverinfo: "skip",
+              showlegend: false,
+              ...(side
+                ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` }
+                : {}),
+            })),
+          ),
         ],
         layout: {
           hovermode: few ? "x unified" : "closest",

@@ -144,6 +144,9 @@
     });
     const scroll = table.closest(".dt-layout-table");
     Fclib.set(scroll, { tabindex: 0, role: "region", "aria-label": caption });
+    // several tables of a page are told apart
+    for (const pages of api.table().container().querySelectorAll("nav"))
+      Fclib.set(pages, { "aria-label": `Pages of: ${caption}` });
     if (onstate)
       api.on("draw.dt", () => {
         const [first] = api.order();

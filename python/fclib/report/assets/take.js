@@ -119,8 +119,8 @@
     ].filter(Boolean);
   Fclib.problemCitation = (id, record) =>
     Fclib.values.site.cite.problem
-      .replaceAll("{id}", id)
-      .replaceAll("{key}", id.replaceAll("/", "-"))
+      .replaceAll("{id}", () => Fclib.escaped(id))
+      .replaceAll("{key}", id.replaceAll(/[^\w-]+/g, "-"))
       .replaceAll("{version}", record.version || "of no set")
       .replaceAll("{digest}", record.digest || "not known");
 

@@ -110,6 +110,9 @@
       for (let k = 0; k < cat.size; k++) words(k);
     });
     const says = h("p", { class: "small", role: "status" });
+    const told = (own, all) =>
+      `${own.problems} of ${Fclib.count(all.problems, "problem")}` +
+      (all.copies ? ` and ${own.copies} of ${Fclib.count(all.copies, "copy", "copies")}` : "");
     let listed = [];
     const rows = () => {
       let parsed;
@@ -156,7 +159,7 @@
             .map((part) => part.text);
       says.className = "small soft";
       says.textContent =
-        `${listed.length} of ${Fclib.count(cat.size, "problem")}` +
+        told(Fclib.tally(listed), site()) +
         `${lost.length ? `; no problem at all has: ${lost.join(", ")}` : ""}`;
       return listed;
     };

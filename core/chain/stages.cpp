@@ -23,9 +23,8 @@ namespace {
 // What no table sets. workshop/tuning/constants.py tries other values of some.
 
 // Operations: of a sweep, for each contact, besides one for each entry of W; and of a factorisation
-// with its solve and the rest of an iteration, over its multiplications (workshop/tuning/costs.py).
+// with its solve and the rest of an iteration, over its multiplications.
 constexpr double sweep_operations = 60;
-constexpr double sweep_operations_of_others = 600;  // ... if the law is not Coulomb's
 constexpr double iteration_operations = 1500;
 
 constexpr double never_too_much = 256e6;    // [bytes] Factors of this size always fit.
@@ -33,10 +32,9 @@ constexpr double spare_memory = 0.8;        // share of the available memory tha
 constexpr double instead_of_factors = 100;  // cost of steps [factorisations] without memory
 
 // Gauss-Seidel
-constexpr std::int64_t sweeps_per_look = 5;      // sweeps between two looks at the error
-constexpr Index few_contacts = 10;               // so few are looked at after 1, 3 and 5 sweeps
-constexpr std::int64_t sweeps_before_look = 10;  // sweeps before the rate is looked at
-constexpr double sweep_slack = 1;                // more sweeps may be needed than are paid for
+constexpr std::int64_t sweeps_per_look = 5;  // sweeps between two looks at the error
+constexpr Index few_contacts = 10;           // so few are looked at after 1, 3 and 5 sweeps
+constexpr double extension = 20;             // the sweeps go on if at most so many limits are left
 
 // sweeps and gradients that go on
 constexpr std::int64_t steps_per_look = 10;  // steps between two looks at the error
@@ -76,11 +74,9 @@ constexpr std::int64_t random_sweeps = 5;   // sweeps if Newton's method stands 
 constexpr std::int64_t random_polish = 24;  // factorisations of the polish
 
 /// Operations of a sweep, and of a factorisation with the rest of an iteration.
-template <class Cone>
 double sweep_cost(const ReducedProblem& problem) {
-  constexpr bool coulomb = std::is_same_v<Cone, Coulomb<Cone::dim>>;
-  constexpr double operations = coulomb ? sweep_operations : sweep_operations_of_others;
-  return operations * static_cast<double>(problem.nc()) + static_cast<double>(problem.W.entries());
+  return sweep_operations * static_cast<double>(problem.nc()) +
+         static_cast<double>(problem.W.entries());
 }
 double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& system) {
   return iteration_operations * static_cast<double>(problem.nc()) + system.flops();
@@ -102,19 +98,16 @@ class Random {
 /// steps that are paid for.
 class ConvergenceRate {
  public:
-  ConvergenceRate(std::int64_t first_look, double slack, double tolerance)
-      : first_look_(first_look), slack_(slack), tolerance_(tolerance) {}
+  ConvergenceRate(std::int64_t first_look, double budget, double tolerance)
+      : first_look_(first_look), budget_(budget), tolerance_(tolerance) {}
 
-  /// Call after k steps. `budget()` are the steps that are paid for.
-  template <class Budget>
-  bool hopeless(std::int64_t k, double error, const Budget& budget) {
+  /// Call after k steps.
+  bool hopeless(std::int64_t k, double error) {
     least_ = std::min(least_, error);
     if (k < 2 * mark_ || k < first_look_) return false;
-    if (mark_ > 0) {
-      const double rate = std::log(marked_ / least_) / static_cast<double>(k - mark_);
-      const double left = std::log(least_ / tolerance_) / rate;
-      if (!(rate > 0) || left > slack_ * (budget() - static_cast<double>(k))) return true;
-    }
+    const double rate = std::log(marked_ / least_) / static_cast<double>(k - mark_);
+    const double left = std::log(least_ / tolerance_) / rate;
+    if (!(rate > 0) || left > rate_slack * (budget_ - static_cast<double>(k))) return true;
     marked_ = least_;
     least_ = endless;
     mark_ = k;
@@ -123,7 +116,7 @@ class ConvergenceRate {
 
  private:
   std::int64_t first_look_;
-  double slack_;  // so many times the steps that are paid for may be needed
+  double budget_;
   double tolerance_;
   double least_ = endless;   // error since the last look
   double marked_ = endless;  // ... and before it
@@ -269,11 +262,8 @@ template <class Cone>
 void Island<Cone>::run(const GaussSeidelStage& rules) {
   const std::int64_t interval = sweeps_per_look;
   std::int64_t limit = rules.limit;
+  double last = error_;
   std::int64_t k = 0;
-  ConvergenceRate rate(sweeps_before_look, sweep_slack, tolerance_);
-  const auto budget = [&] {
-    return rules.worth * factorisation_cost(problem_, system()) / sweep_cost<Cone>(problem_);
-  };
   while (k < limit) {
     // one sweep solves some problems; a few sweeps solve some with few contacts
     const bool few = problem_.nc() <= few_contacts;
@@ -290,10 +280,16 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
       if (!std::isfinite(error)) return_to_best();
       return;
     }
-    if (rules.worth > 0) {
-      if (rate.hopeless(k, error, budget)) return;
-      if (k == limit) limit += interval;
+    if (rules.worth > 0 && k >= 2 * interval && k >= limit / 4) {
+      const double rate = std::log(last / error) / static_cast<double>(count);
+      const double left = std::log(error / tolerance_) / rate;
+      if (!(rate > 0) ||
+          left * sweep_cost(problem_) > rules.worth * factorisation_cost(problem_, system())) {
+        return;
+      }
+      if (k == limit && left < extension * static_cast<double>(limit)) limit += interval;
     }
+    last = error;
   }
 }
 
@@ -303,14 +299,14 @@ double Island<Cone>::paid_for(const Patience& rules) {
                                 : rules.worth > 0 ? rules.worth
                                                   : static_cast<double>(system().factorisations());
   const double steps =
-      factorisations * factorisation_cost(problem_, system()) / sweep_cost<Cone>(problem_);
+      factorisations * factorisation_cost(problem_, system()) / sweep_cost(problem_);
   return rules.worth > 0 && steps < 2.0 * static_cast<double>(rules.first_look) ? 0.0 : steps;
 }
 
 template <class Cone>
 void Island<Cone>::run(const SweepOnStage& rules) {
   const double budget = paid_for(rules);
-  ConvergenceRate rate(rules.first_look, rate_slack, tolerance_);
+  ConvergenceRate rate(rules.first_look, budget, tolerance_);
   r_ = best_;
   problem_.velocity(r_, u_);
   for (std::int64_t k = steps_per_look; static_cast<double>(k) < budget; k += steps_per_look) {
@@ -322,7 +318,7 @@ void Island<Cone>::run(const SweepOnStage& rules) {
       if (!std::isfinite(error)) return_to_best();
       return;
     }
-    if (rate.hopeless(k, error, [&] { return budget; })) return;
+    if (rate.hopeless(k, error)) return;
   }
 }
 
@@ -330,7 +326,7 @@ template <class Cone>
 void Island<Cone>::run(const SpectralGradientStage& rules) {
   const double budget = paid_for(rules);
   if (!(budget > 0)) return;
-  ConvergenceRate rate(rules.first_look, rate_slack, tolerance_);
+  ConvergenceRate rate(rules.first_look, budget, tolerance_);
   Vector r = start_of(rules.from);
   Vector u(problem_.m());
   problem_.velocity(r, u);
@@ -345,8 +341,7 @@ void Island<Cone>::run(const SpectralGradientStage& rules) {
     }
     k += since;
     const std::int64_t count = std::exchange(since, 0);
-    return take(count, error, r) || static_cast<double>(k) > budget ||
-           rate.hopeless(k, error, [&] { return budget; });
+    return take(count, error, r) || static_cast<double>(k) > budget || rate.hopeless(k, error);
   });
 }
 

@@ -110,10 +110,11 @@ struct GaussSeidelStage {
 
   static constexpr auto fields() {
     using O = GaussSeidelStage;
-    return std::tuple{option("limit", &O::limit, "sweeps", {1, 1e9},
-                             "The largest number of sweeps. There are more if they converge soon."),
-                      option("worth", &O::worth, "factorisations", {0},
-                             "What all sweeps, at their rate, may cost. 0: anything.")};
+    return std::tuple{
+        option("limit", &O::limit, "sweeps", {1, 1e9},
+               "The largest number of sweeps. There are more if they converge soon."),
+        option("worth", &O::worth, "factorisations", {0},
+               "What the sweeps that are left, at their rate, may cost. 0: anything.")};
   }
 };
 

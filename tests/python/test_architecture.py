@@ -181,6 +181,7 @@ PYTHON: dict[str, set[str]] = {
         "_sequence",
         "_solve",
         "_verdicts",
+        "_words",
         "__init__",
         "external",
         "_symmetry",

@@ -204,6 +204,11 @@ def test_the_solver_table_sorts_filters_and_keeps_its_state(go: Opener) -> None:
     assert again.locator(shown).locator("th[aria-sort=descending]").count() == 1
 
 
+# whether so many rows are listed, problems and copies
+LISTED = """wanted => [...document.querySelector('[role=status]').textContent.matchAll(/(\\d+) of/g)]
+    .reduce((sum, found) => sum + Number(found[1]), 0) === wanted"""
+
+
 def listed(text: str) -> tuple[int, int]:
     """How many rows are listed, and of how many: "9 of 11 problems and 1 of 2 copies"."""
     pairs = [(int(a), int(b)) for a, b in re.findall(r"(\d+) of (\d+)", text)]
@@ -216,10 +221,7 @@ def test_the_catalogue_filters_sorts_and_keeps_its_state(go: Opener, site: Path)
     said = page.get_by_role("status")
     assert listed(said.inner_text()) == (total, total)
     page.get_by_label("filter").fill("contacts > 4 family = BoxesStack")
-    page.wait_for_function(
-        "[...document.querySelector('[role=status]').textContent.matchAll(/(\\d+) of/g)]"
-        ".reduce((sum, found) => sum + Number(found[1]), 0) === 10"
-    )
+    page.wait_for_function(LISTED, arg=10)
     head(page, "contacts").click()
     page.locator("th[aria-sort=ascending]").wait_for()
     heads = page.locator("thead th").all_inner_texts()
@@ -239,9 +241,7 @@ def test_the_catalogue_filters_sorts_and_keeps_its_state(go: Opener, site: Path)
     empty = go("#/catalogue?q=colour%3Dred")
     assert "Nothing is listed" in empty.get_by_role("status").inner_text()
     again.get_by_label("filter").fill("")
-    again.wait_for_function(
-        f"document.querySelector('[role=status]').textContent.startsWith('{total} ')"
-    )
+    again.wait_for_function(LISTED, arg=total)
     with again.expect_download() as saved:
         again.get_by_role("button", name="CSV").click()
     rows = list(csv.DictReader(io.StringIO(Path(saved.value.path()).read_text())))

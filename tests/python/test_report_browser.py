@@ -205,8 +205,9 @@ def test_the_solver_table_sorts_filters_and_keeps_its_state(go: Opener) -> None:
 
 
 # whether so many rows are listed, problems and copies
-LISTED = """wanted => [...document.querySelector('[role=status]').textContent.matchAll(/(\\d+) of/g)]
-    .reduce((sum, found) => sum + Number(found[1]), 0) === wanted"""
+LISTED = """wanted => [
+    ...document.querySelector('[role=status]').textContent.matchAll(/(\\d+) of/g)
+].reduce((sum, found) => sum + Number(found[1]), 0) === wanted"""
 
 
 def listed(text: str) -> tuple[int, int]:

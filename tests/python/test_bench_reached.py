@@ -139,6 +139,8 @@ def test_only_what_was_solved_is_repeated(tmp_path: Path) -> None:
     bench.run_campaign(chosen, path)
     with bench.Store(path) as store:
         rows = list(store.table())
+        (status,) = store.status()
+    assert (status.done, status.planned) == (32, 32)  # a campaign that has ended is whole
     counts = Counter((row["solver"], row["tol"], row["repeat"]) for row in rows)
     whole = {("nsgs", tol, repeat): 4 for tol in (1e-8, 1e-4) for repeat in (0, 1)}
     assert counts == whole | {("short", tol, 0): 4 for tol in (1e-8, 1e-4)}

@@ -43,8 +43,11 @@ def test_look(root: Path, tmp_path: Path) -> None:
     assert fclib.read(tmp_path / "stack.hdf5").nc == 40
 
 
-def test_mass_and_friction_of_a_cube_in_many_worlds(root: Path, tmp_path: Path) -> None:
-    last = run(root, tmp_path, "worlds.py", 256).splitlines()[-2]
+@pytest.mark.parametrize("worlds", [(256,), pytest.param((), marks=pytest.mark.long)])
+def test_mass_and_friction_of_a_cube_in_many_worlds(
+    worlds: tuple[int, ...], root: Path, tmp_path: Path
+) -> None:
+    last = run(root, tmp_path, "worlds.py", *worlds).splitlines()[-2]
     mass, mu = (float(number) for number in re.findall(r"(?:mass|mu) ([\d.]+)", last))
     assert abs(mass - 1.7) < 0.01
     assert abs(mu - 0.35) < 0.005

@@ -155,6 +155,11 @@ def test_a_campaign_goes_on_from_published_runs(tmp_path: Path) -> None:
         assert {(row["solver"], row["node"]) for row in rows} == {("ppa-nsn", "slow")}
         assert list(results.shards(parts)[0].machines) != list(results.shards(parts)[1].machines)
         assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is None
+    # a machine may be published under its own host name
+    named = store(tmp_path / "named.sqlite", facts("slow", 1.0), ["admm"])
+    with bench.Store(named) as opened:
+        assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is not None
+        assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is None
     wrong = CliRunner().invoke(app, [*words, "--name", "large"])
     assert wrong.exit_code == 1
     assert "large: there is no such part" in wrong.output

@@ -168,6 +168,8 @@ def test_every_page_opens_and_fits_a_phone(name: str, go: Opener) -> None:
         page.wait_for_function("i => i.complete && i.naturalWidth > 0", arg=image.element_handle())
     page.set_viewport_size(PHONE)
     page.emulate_media(color_scheme="dark")
+    page.reload()
+    page.wait_for_selector("main h1")
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 

@@ -302,11 +302,11 @@ def run_campaign(
                         queue.finish(job)
                     show(progress)
                     if time.monotonic() - beat > BEAT:
-                        opened.alive(number)
+                        opened.alive(number, skipped=progress.skipped)
                         beat = time.monotonic()
         finally:
             # also after an interrupt, so that nobody waits for it
-            opened.alive(number, ended=True)
+            opened.alive(number, ended=True, skipped=progress.skipped)
         return progress
 
 

@@ -528,13 +528,14 @@ class Store:
             self._seal("campaigns", "id = ?", number)
         return number
 
-    def alive(self, campaign: int, ended: bool = False) -> None:
-        """Note that a campaign is at work, or has ended."""
+    def alive(self, campaign: int, ended: bool = False, skipped: int | None = None) -> None:
+        """Note that a campaign is at work, or has ended; `skipped` runs need not be done."""
         now = time.time()
         with self.transaction():
             self.db.execute(
-                "UPDATE campaigns SET seen = ?, ended = ? WHERE id = ?",
-                (now, now if ended else None, campaign),
+                "UPDATE campaigns SET seen = ?, ended = ?, skipped = ifnull(?, skipped)"
+                " WHERE id = ?",
+                (now, now if ended else None, skipped, campaign),
             )
             self._seal("campaigns", "id = ?", campaign)
 

@@ -169,13 +169,13 @@ def pack(
     if not NAME.fullmatch(name):
         raise ShardError(f"{name!r}: is no name of a part: use letters, digits, . _ -")
     pa = arrow()
-    published = list(there)
     known = {
-        (row["key"], row["node"]) for one in published for row in rows_of(one.path, ("key", "node"))
+        (row["key"], row["node"]) for one in there for row in rows_of(one.path, ("key", "node"))
     }
-    # runs that `unpack` has put there are published under the name of their machine
-    packed = {name for one in published for name in one.machines}
-    own = {k: facts for k, facts in store.machines().items() if facts.get("node") not in packed}
+    # what `unpack` has put there is published, under the name that its machine has in the store
+    new = [row for row in store.table(more=LONG) if (row["key"], row["node"]) not in known]
+    there_now = {row["machine"] for row in new}
+    own = {key: facts for key, facts in store.machines().items() if key in there_now}
     nodes = sorted({str(facts.get("node")) for facts in own.values()})
     if machine and len(nodes) > 1:
         raise ShardError(
@@ -186,9 +186,9 @@ def pack(
     kinds = store.kinds()
     rows = []
     kept = sampled(store) if solutions else set()
-    for row in store.table(more=LONG):
-        label = public.get(row["machine"])
-        if label is None or (row["key"], label) in known:
+    for row in new:
+        label = public[row["machine"]]
+        if (row["key"], label) in known:
             continue
         vectors = store.solution(row["run"]) if row["run"] in kept else {}
         history = thinned(store.history(row["run"]))

@@ -104,7 +104,7 @@ PYTHON: dict[str, set[str]] = {
     },
     "scenes": {"_core", "_entry_points", "_geometry", "_regular", "_stored", "_suggest"},
     "simulate": {"_core", "_geometry", "_laws", "_origin", "_regular", "_solve", "scenes"},
-    "recorders": {"_core", "_origin", "_sequence", "_solve", "external", "scenes"},
+    "recorders": {"_core", "_laws", "_origin", "_sequence", "_solve", "external", "scenes"},
     "collections": {
         "_laws",
         "_core",

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 import fclib
 from fclib import recorders
 from fclib.cli import app
-from helpers import planted_global, planted_local
+from helpers import SPIN_LAWS, planted_global, planted_local, planted_spin
 
 
 def block(mu: float = 0.5, sideways: float = 0.2) -> Any:
@@ -37,6 +37,30 @@ def test_a_solution_is_zero_in_all_criteria() -> None:
             found = recorders.criteria_of(planted.problem, planted.solution)
             assert found.keys() == recorders.CRITERIA.keys()
             assert max(found.values()) < 1e-7
+
+
+@pytest.mark.parametrize(("law", "d"), SPIN_LAWS)
+def test_moments_have_their_own_limits(law: str, d: int) -> None:
+    problem, known = planted_spin(law, d, 3)
+    assert max(recorders.criteria_of(problem, fclib.Solution(r=known)).values()) < 1e-7
+    r = np.reshape(known, (-1, d)).copy()
+    # one contact with a moment of three times its limit
+    pressed = int(np.argmax(r[:, 0]))
+    r[pressed, 1:], r[pressed, 3] = 0, 3 * problem.mu_s[pressed] * r[pressed, 0]
+    found = recorders.criteria_of(problem, fclib.Solution(r=r.ravel()))
+    weight = problem.mu if law == "ellipsoid" else problem.mu_s
+    share = 2 * weight[pressed] * r[pressed, 0] / (weight @ r[:, 0])
+    assert found["cone"] == pytest.approx(share, rel=1e-9)
+
+
+def test_a_moment_that_is_missing_shows_in_the_dissipation() -> None:
+    """A ball that spins on a plane, without a moment: mu_s r_N u_S is missing."""
+    problem = fclib.LocalSpinProblem(
+        spacedim=4, W=np.eye(4), q=[-0.1, 0, 0, 5], mu=[0.5], mu_s=[0.01], coupled=1
+    )
+    found = recorders.criteria_of(problem, fclib.Solution(r=np.array([0.1, 0, 0, 0])))
+    assert found["dissipation"] == pytest.approx(0.01 * 0.1 * 5 / (0.1 * 0.5 * 0.1), rel=1e-12)
+    assert max(found[name] for name in ("penetration", "tension", "distance", "cone")) < 1e-15
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,20 @@ def test_dry_friction_and_limits() -> None:
     assert (made.dofs, made.problem.n, made.problem.nc) == (2, 3, 2)
 
 
+@pytest.mark.parametrize("order", ["NTT", "TTN"])
+def test_moments_follow_the_forces_in_any_order(order: Any) -> None:
+    """A body of six coordinates on one contact, whose rows are its own coordinates."""
+    rows = np.eye(6)[[2, 0, 1, 5, 3, 4]]  # N, T1, T2, S, R1, R2
+    given = rows if order == "NTT" else rows[[1, 2, 0, 3, 4, 5]]
+    speed = np.array([1.0, 0, -1, 0.1, 0, 50])
+    contacts = recorders.Contacts(jacobian=given, mu=[0.5], mu_s=[0.2], mu_r=[0.1], order=order)
+    limits = recorders.Limits(jacobian=[[0, 1.0, 0, 0, 0, 0]], w=[1.0])
+    made = recorders.assemble(np.eye(6), speed, H, contacts, limits=limits)
+    assert (made.problem.kind, made.problem.spacedim, made.problem.nc) == ("global_spin", 6, 2)
+    # stops; slides, spins at their limits; rolling stops
+    np.testing.assert_allclose(solved(made).v, [0.5, 0, 0, 0, 0, 49.8], atol=1e-8)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -112,6 +126,11 @@ def test_dry_friction_and_limits() -> None:
         ({"contacts": recorders.Contacts(jacobian=np.eye(3), mu=[1, 1])}, "is of shape"),
         ({"compliance": [-1, 0, 0]}, "must be >= 0"),
         ({"contacts": None, "compliance": [0]}, "there are none"),
+        ({"contacts": recorders.Contacts(jacobian=FRAME, mu=[1], mu_s=[1])}, "is of shape"),
+        (
+            {"contacts": recorders.Contacts(jacobian=np.ones((4, 3)), mu=[1], mu_s=[1, 1])},
+            "mu_s: has 2 numbers, not 1",
+        ),
         (
             {"dry_friction": recorders.DryFriction(jacobian=np.eye(3), bound=[1, 1, -1])},
             "bound of dry friction",
@@ -942,14 +961,56 @@ def test_mujocos_reaction_gives_its_next_velocity(
         assert step.mismatch < 1e-12
         assert step.contacts is not None
         contacts = max(contacts, len(step.contacts))
-        r = step.guess.r.reshape(-1, 3)
+        r = step.guess.r.reshape(-1, {4: 4, 6: 6}.get(condim, 3))
         assert (r[:, 0] >= 0).all()
         if cone == "elliptic":  # the corners of a pyramid are outside of the cone
-            slack = step.problem.mu * r[:, 0] - np.hypot(r[:, 1], r[:, 2])
-            assert slack.min() > -1e-9 * np.abs(r).max()
+            assert recorders.criteria_of(step.problem, step.guess)["cone"] < 1e-8
     assert contacts > 1
+    assert step.problem.kind == ("global_spin" if condim > 3 else "global")
     assert step.assembled.problem.p == 1
     assert fclib.solve(step.problem).converged
+
+
+@pytest.mark.parametrize(
+    ("condim", "friction", "kind", "d"),
+    [
+        (4, "0.5 0.02 0", "global_spin", 4),
+        (6, "0.5 0.02 0.01", "global_spin", 6),
+        (6, "0.5 0 0.01", "global_rolling", 5),
+        (3, "0.5 0.02 0.01", "global", 3),
+    ],
+)
+def test_the_moment_that_brakes_a_top_is_recorded(
+    condim: int, friction: str, kind: str, d: int
+) -> None:
+    """A ball that spins where it lies: m_N = -mu_s r_N, by MuJoCo and by Coulomb's law."""
+    mujoco = pytest.importorskip("mujoco")
+    shape = f'condim="{condim}" friction="{friction}"'
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="1 1 1" {shape}/>'
+        f'<body pos="0 0 .1"><freejoint/><geom size=".1" mass="2" {shape}/></body>'
+        '<body pos="1 0 1"><joint range="0 20"/><geom type="capsule" size=".02 .1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    for _ in range(500):
+        data.qvel[5] = 1  # MuJoCo's law lifts what spins faster
+        step = recorders.mujoco(model, data)
+    problem: Any = step.problem
+    assert (problem.kind, problem.spacedim) == (kind, d)
+    assert step.mismatch is not None
+    assert step.mismatch < 1e-9
+    assert problem.info.math_info.count("S") == (d in (4, 6))
+    assert step.guess is not None
+    r = step.guess.r[:d]
+    assert r[0] == pytest.approx(2 * 9.81 * 0.002, rel=1e-3)
+    result = fclib.solve(problem, tol=1e-10)
+    assert result.converged
+    assert result.solution.r[0] == pytest.approx(r[0], rel=1e-3)
+    if kind == "global_spin":
+        assert problem.mu_s[0] == 0.02
+        assert r[3] == pytest.approx(-0.02 * r[0], rel=1e-6)
+        assert result.solution.r[3] == pytest.approx(-0.02 * result.solution.r[0], rel=1e-8)
 
 
 class Worlds:

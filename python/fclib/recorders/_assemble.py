@@ -19,7 +19,7 @@ import numpy.typing as npt
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 
 Vector = npt.NDArray[np.float64]
 ORDERS: Final = {"NTT": (0, 1, 2), "TTN": (2, 0, 1)}
@@ -28,11 +28,18 @@ RANK: Final = 1e-9  # least size of an independent row of a joint, relative to t
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """nc contacts; the rows of a contact are normal and tangents, in `order`."""
+    """nc contacts; the rows of a contact are normal and tangents, in `order`.
 
-    jacobian: Any  # (3 nc x n) u = J v + w
+    With `mu_s` the angular velocity about the normal follows, and with `mu_r` those about the
+    tangents: d = 4, 5 or 6 rows. If contacts resist spin and not rolling, sliding and spin share
+    their limit, as in MuJoCo's elliptic cone.
+    """
+
+    jacobian: Any  # (d nc x n) u = J v + w
     mu: npt.ArrayLike  # (nc)
-    w: npt.ArrayLike | None = None  # (3 nc) [m/s]; None: 0
+    mu_s: npt.ArrayLike | None = None  # (nc) of spin [m]
+    mu_r: npt.ArrayLike | None = None  # (nc) of rolling [m]
+    w: npt.ArrayLike | None = None  # (d nc) [m/s], [rad/s]; None: 0
     order: Literal["NTT", "TTN"] = "NTT"
     point: Vector | None = None  # (nc x 3) in the world [m]
     frame: Vector | None = None  # (nc x 3 x 3) rows N, T1, T2
@@ -41,6 +48,18 @@ class Contacts:
 
     def __len__(self) -> int:
         return len(np.atleast_1d(np.asarray(self.mu, dtype=float)))
+
+    @property
+    def components(self) -> int:
+        """The rows of a contact, d."""
+        return 3 + (self.mu_s is not None) + 2 * (self.mu_r is not None)
+
+    @property
+    def places(self) -> npt.NDArray[np.int64]:
+        """The rows in the order N, T1, T2, then those of moments."""
+        d = self.components
+        order = (*ORDERS[self.order], *range(3, d))
+        return np.asarray((d * np.arange(len(self))[:, None] + order).ravel(), dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +91,7 @@ class DryFriction:
 class Assembled:
     """A problem, and the joint rows left out of it."""
 
-    problem: Any  # a GlobalProblem; a LocalProblem if the engine gives only W
+    problem: Any  # a global problem; a LocalProblem if the engine gives only W
     dofs: int  # n; further degrees of freedom are auxiliary; for a local problem m
     redundant: tuple[int, ...] = ()  # rows of joints that follow from the others
     violated: float = 0.0  # largest deviation of a redundant row from its combination [m/s]
@@ -102,7 +121,7 @@ def assemble(
         joints: bilateral rows; those that follow from others are left out.
         limits: unilateral rows without friction.
         dry_friction: dry friction of joints.
-        compliance: (3 nc) R of each component of `contacts`, in their order, 0 if it is rigid.
+        compliance: (d nc) R of each component of `contacts`, in their order, 0 if it is rigid.
         info: info of the problem.
 
     Raises:
@@ -117,27 +136,27 @@ def assemble(
         factor = la.cholesky(0.5 * (M + M.T), lower=True)
     except la.LinAlgError:
         raise ValueError("M is not positive definite") from None
-    nc = 0 if contacts is None else len(contacts)
+    nc, d = (0, 3) if contacts is None else (len(contacts), contacts.components)
     rows: list[Vector] = []
     w: list[Vector] = []
     mu: list[Vector] = []
-    R = np.zeros(3 * nc)
+    R = np.zeros(d * nc)
     if contacts is not None:
-        J = dense(contacts.jacobian, "the contacts' Jacobian", (3 * nc, n))
-        order = (3 * np.arange(nc)[:, None] + ORDERS[contacts.order]).ravel()
+        J = dense(contacts.jacobian, "the contacts' Jacobian", (d * nc, n))
+        order = contacts.places
         rows.append(J[order])
-        w.append(filled(contacts.w, 3 * nc, "w of the contacts")[order])
+        w.append(filled(contacts.w, d * nc, "w of the contacts")[order])
         mu.append(filled(contacts.mu, nc, "mu"))
         if compliance is not None:
-            R = filled(compliance, 3 * nc, "the compliance")[order]
+            R = filled(compliance, d * nc, "the compliance")[order]
             if not (R >= 0).all():
                 raise ValueError(f"the compliance must be >= 0, not {R.min():g}")
     elif compliance is not None:
         raise ValueError("the compliance is that of contacts, and there are none")
     if limits is not None:
         J = dense(limits.jacobian, "the limits' Jacobian", (None, n))
-        own, speed = np.zeros((3 * len(J), n)), np.zeros(3 * len(J))
-        own[::3], speed[::3] = J, filled(limits.w, len(J), "w of the limits")
+        own, speed = np.zeros((d * len(J), n)), np.zeros(d * len(J))
+        own[::d], speed[::d] = J, filled(limits.w, len(J), "w of the limits")
         rows.append(own)
         w.append(speed)
         mu.append(np.zeros(len(J)))
@@ -154,17 +173,17 @@ def assemble(
         bound = filled(dry_friction.bound, len(J), "the bounds of dry friction")
         if not (bound >= 0).all():
             raise ValueError(f"a bound of dry friction must be >= 0, not {bound.min():g}")
-        own = np.zeros((3 * len(J), n))
-        own[1::3] = J
+        own = np.zeros((d * len(J), n))
+        own[1::d] = J
         rows.append(own)
-        w.append(np.zeros(3 * len(J)))
+        w.append(np.zeros(d * len(J)))
         mu.append(np.ones(len(J)))
         # the mass is the inertia that the row moves
         moved = la.solve_triangular(factor, J.T, lower=True)
         inverse = (moved**2).sum(axis=0)
         mass.append(1 / np.where(inverse > 0, inverse, 1.0))
         momentum.append(-h * bound)
-        at.append(before + 3 * np.arange(len(J)))
+        at.append(before + d * np.arange(len(J)))
     places = np.concatenate(at)
     k = len(places)
     H_own = np.concatenate(rows) if rows else np.zeros((0, n))
@@ -182,17 +201,32 @@ def assemble(
         if kept.size:
             G = sp.csc_array(np.vstack((J[kept].T, np.zeros((k, len(kept))))))
             b = prescribed[kept]
-    problem = _core.GlobalProblem(
-        spacedim=3,
-        M=sp.csc_array(sp.block_diag((sp.csc_array(M), sp.diags_array(np.concatenate(mass))))),
-        H=sp.csc_array(H),
-        G=G,
-        f=np.concatenate((M @ v_free, *momentum)),
-        w=np.concatenate(w) if w else np.zeros(0),
-        mu=np.concatenate(mu) if mu else np.zeros(0),
-        b=b,
-        info=info or _core.ProblemInfo(),
-    )
+    limit = np.concatenate(mu) if mu else np.zeros(0)
+    fields: dict[str, Any] = {
+        "spacedim": d,
+        "M": sp.csc_array(sp.block_diag((sp.csc_array(M), sp.diags_array(np.concatenate(mass))))),
+        "H": sp.csc_array(H),
+        "G": G,
+        "f": np.concatenate((M @ v_free, *momentum)),
+        "w": np.concatenate(w) if w else np.zeros(0),
+        "mu": limit,
+        "b": b,
+        "info": info or _core.ProblemInfo(),
+    }
+    problem: _laws.Global
+    if contacts is None or d == 3:
+        problem = _core.GlobalProblem(**fields)
+    else:
+        others = np.zeros(len(limit) - nc)
+        turning: dict[str, Any] = {
+            name: np.concatenate((filled(own, nc, name), others))
+            for name in ("mu_s", "mu_r")
+            if (own := getattr(contacts, name)) is not None
+        }
+        if contacts.mu_s is None:
+            problem = _core.GlobalRollingProblem(**fields, **turning)
+        else:
+            problem = _core.GlobalSpinProblem(**fields, **turning, coupled=int(d == 4))
     return Assembled(problem, n, redundant, violated)
 
 
@@ -221,7 +255,14 @@ def associated_error(problem: Any, r: npt.ArrayLike) -> float:
     """The error of reactions by the associated law: u, not u^, in K*, with u . r = 0.
 
     It is `natural` without the shift mu ||u_T||: ||r - P_K(r - u)|| / ||q||.
+
+    Raises:
+        ValueError: the problem has rolling or spin friction.
     """
+    if _laws.law_of(problem.kind):
+        raise ValueError(
+            "the associated law is that of contacts that do not resist rolling or spin"
+        )
     local = problem.condense() if problem.kind.startswith("global") else problem
     r = vector(r)
     x = np.reshape(r - (local.W @ r + local.q), (-1, local.spacedim))
@@ -245,6 +286,7 @@ def solve_associated(problem: Any, tol: float = 1e-8) -> Any:
 
     Raises:
         OptionError, UnsuitableError: as `fclib.solve`.
+        ValueError: the problem has rolling or spin friction.
     """
     # a start that Coulomb's law would not accept as a solution
     start = np.zeros((problem.nc, problem.spacedim))

@@ -4,7 +4,8 @@ The criteria are those of Le Lidec, Jallet, Montaut, Laptev, Schmid and Carpenti
 in robotics: a comparative analysis" (IEEE T-RO 2024): Signorini's condition, Coulomb's cone, the
 principle of maximal dissipation, and energy. Each is a number without unit. Impulses are relative
 to those of the step, and velocities to the largest one that contacts would have without reactions,
-so that steps and scenes can be compared.
+so that steps and scenes can be compared. Moments of spin and rolling are judged by their own
+limits, and their power relative to that of forces.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core, _solve
+from fclib import _core, _laws, _solve
 from fclib._origin import origin_of
 
 # meaning of each criterion: 0 for a solution of Coulomb's law
@@ -26,9 +27,10 @@ CRITERIA: Final = {
     "penetration": "how fast contacts close: largest -u_N, over V",
     "tension": "how contacts pull: sum of -r_N if it is negative, over the sum of |r_N|",
     "distance": "what acts at contacts that open: sum of r_N u_N, over V times the sum of |r|",
-    "cone": "friction that is too large: sum of ||r_T|| - mu r_N, over the sum of mu |r_N|",
+    "cone": "friction that is too large: sum of ||r_T|| - mu r_N, over the sum of mu |r_N|; of"
+    " sliding, spin and rolling the largest",
     "dissipation": "power of friction that is missing: sum of r_T . u_T + mu r_N ||u_T||, over V"
-    " times the sum of mu |r_N|",
+    " times the sum of mu |r_N|; with spin and rolling that of all together",
     "energy": "power that contacts make: r . u if it is positive, over V times the sum of |r|",
 }
 
@@ -58,14 +60,12 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     """The criteria of reactions, by their names. V is the largest velocity without reactions.
 
     Args:
-        problem: global or local, without rolling friction.
+        problem: local or global, of any law.
         solution: with r (m); the multipliers of joints if there are joints. u follows from them.
 
     Raises:
-        ValueError: the problem has rolling friction, or the solution another size.
+        ValueError: the solution has another size.
     """
-    if problem.kind not in ("local", "global"):
-        raise ValueError("the criteria are those of contacts that do not resist rolling or spin")
     r = np.asarray(solution.r, dtype=float)
     if len(r) != problem.m:
         raise ValueError(f"the reaction has {len(r)} numbers, and the problem has {problem.m}")
@@ -76,21 +76,36 @@ def criteria_of(problem: Any, solution: Any) -> dict[str, float]:
     r = r / float(np.abs(r).max(initial=0) or 1.0)
     pace = float(np.abs(u).max(initial=0) or 1.0)
     u = u / pace
-    mu = np.asarray(problem.mu)
-    normal, slip = r[:, 0], np.linalg.norm(u[:, 1:], axis=1)
-    friction, bound = np.linalg.norm(r[:, 1:], axis=1), mu * np.abs(normal)
+    normal = r[:, 0]
     free = problem.condense().q if hasattr(problem, "condense") else problem.q
-    fastest = float(np.linalg.norm(np.reshape(free, u.shape), axis=1).max(initial=0) / pace)
-    power = fastest * np.linalg.norm(r, axis=1).sum()
+    forces = slice(0, _laws.of_force(problem.kind, problem.spacedim))
+    fastest = float(
+        np.linalg.norm(np.reshape(free, u.shape)[:, forces], axis=1).max(initial=0) / pace
+    )
+    power = fastest * np.linalg.norm(r[:, forces], axis=1).sum()
     work = np.sum(r * u, axis=1)
-    missing = np.sum(r[:, 1:] * u[:, 1:], axis=1) + mu * np.maximum(normal, 0) * slip
+    limit = float(np.asarray(problem.mu) @ np.abs(normal))
+    missing = np.zeros(len(r))
+    cones = [0.0]
+    for group in _laws.groups(problem):
+        own = r[:, group.part]
+        missing += np.sum(own * u[:, group.part], axis=1)
+        missing += np.maximum(normal, 0) * group.resistance(u)
+        size = group.coefficient
+        if group.uniform:
+            moved = np.linalg.norm(own, axis=1)
+        else:  # an ellipsoid, stretched to a ball
+            axes = np.maximum(group.axes, np.finfo(float).tiny)
+            moved = np.linalg.norm(own * (size[:, None] / axes), axis=1)
+        excess = np.maximum(moved - size * np.maximum(normal, 0), 0).sum()
+        cones.append(share(float(excess), float(size @ np.abs(normal))))
     return {
         "error": merit.error,
         "penetration": share(float(np.max(-u[:, 0], initial=0)), fastest),
         "tension": share(np.maximum(-normal, 0).sum(), np.abs(normal).sum()),
         "distance": share(float(np.maximum(normal, 0) @ np.maximum(u[:, 0], 0)), power),
-        "cone": share(np.maximum(friction - mu * np.maximum(normal, 0), 0).sum(), bound.sum()),
-        "dissipation": share(np.maximum(missing, 0).sum(), fastest * bound.sum()),
+        "cone": max(cones),
+        "dissipation": share(np.maximum(missing, 0).sum(), fastest * limit),
         "energy": share(max(work.sum(), 0), power),
     }
 
@@ -111,7 +126,6 @@ def judge(paths: Sequence[Path], *, tolerance: float = 1e-8) -> Iterator[Judgeme
 
     Raises:
         fclib.FileError: a file cannot be read, or has no guess.
-        ValueError: a problem has rolling friction.
     """
     for path in paths:
         problem: Any = _core.read(path)

@@ -26,6 +26,7 @@ from fclib.recorders._assemble import (
     assemble,
 )
 from fclib.recorders._recorded import Recorded, SetupError
+from fclib.scenes.shared.condim import rolls, spins
 
 LICENCE = "Apache-2.0"
 EXACT = 1e-8  # largest difference of the velocities of a step that is exact, relative
@@ -99,7 +100,7 @@ def record(
         else None,
         DryFriction(jacobian=J[dry], bound=bound) if dry.any() else None,
     )
-    r = np.zeros((assembled.problem.nc, 3))
+    r = np.zeros((assembled.problem.nc, contacts.components))
     nc, end = len(contacts), len(contacts) + int(limits.sum())
     r[:nc] = reaction
     r[nc:end, 0] = force[limits]
@@ -192,14 +193,18 @@ def contacts_of(
     """The contacts on which the solver worked, and what it found for them.
 
     Returns:
-        contacts, impulses (nc x 3) [N s], the generalised impulse (n) of the moments of torsional
-        and rolling friction, and what is left out.
+        contacts of d components, impulses (nc x d) [N s] and [N m s], the generalised impulse (n)
+        of the moments that the problem lacks, and what is left out.
     """
     found = [data.contact[k] for k in range(data.ncon)]
     active = [k for k, one in enumerate(found) if one.exclude == 0]
+    spin, rolling = spins(model), rolls(model)
+    # the rows of MuJoCo that are kept: N, T1, T2, then spin, R1, R2
+    kept = [0, 1, 2, *([3] if spin else []), *([4, 5] if rolling else [])]
+    others = np.setdiff1d(np.arange(6), kept)
     rows, pairs, r = [], [], []
     twist = np.zeros(model.nv)
-    mu, notes = np.zeros(len(active)), set()
+    friction, notes = np.zeros((len(active), 5)), set()
     for i, k in enumerate(active):
         one = found[k]
         geoms = np.array(one.geom)
@@ -207,34 +212,37 @@ def contacts_of(
             raise ValueError(f"contact {k}: is one of a flexible body, which is not recorded")
         bodies = model.geom_bodyid[geoms]
         frame = np.reshape(one.frame, (3, 3))
-        J, spin = np.zeros((2, 3, model.nv)), np.zeros((2, 3, model.nv))
-        for own, turn, body in zip(J, spin, bodies, strict=True):
-            mj.mj_jac(model, data, own, turn, one.pos, body)
-        rows.append(frame @ (J[1] - J[0]))
+        move, turn = np.zeros((2, 3, model.nv)), np.zeros((2, 3, model.nv))
+        for moved, turned, body in zip(move, turn, bodies, strict=True):
+            mj.mj_jac(model, data, moved, turned, one.pos, body)
+        own = np.vstack((frame @ (move[1] - move[0]), frame @ (turn[1] - turn[0])))
+        rows.append(own[kept])
         pairs.append(bodies)
         force = np.zeros(6)
         mj.mj_contactForce(model, data, k, force)
-        r.append(h * force[:3])
-        if one.dim > 1:
-            mu[i] = one.friction[0]
-            if one.friction[0] != one.friction[1]:
-                notes.add("Friction differs along the tangents: the first coefficient is taken.")
-        if one.dim > 3:
-            twist += h * (frame @ (spin[1] - spin[0])).T @ force[3:]
-            notes.add("The moments of torsional and rolling friction are MuJoCo's, a part of f.")
+        r.append(h * force[kept])
+        # the least friction of MuJoCo where a coefficient is 0
+        twist += h * own[others].T @ force[others]
+        # sliding has two coefficients, spin one, and rolling two
+        known = one.dim - 1
+        friction[i, :known] = np.array(one.friction)[:known]
+        if any(friction[i, a] != friction[i, a + 1] for a in (0, 3) if a < known):
+            notes.add("Friction differs along the tangents: the first coefficient is taken.")
         if np.any(getattr(one, "surfacevel", 0)):
             notes.add("Moving surfaces are left out.")
-    nc = len(active)
+    nc, d = len(active), len(kept)
     gap = np.array([found[k].dist for k in active])
-    w = np.zeros((nc, 3))
+    w = np.zeros((nc, d))
     w[:, 0] = np.maximum(gap, 0) / h
     contacts = Contacts(
-        jacobian=np.reshape(rows, (3 * nc, model.nv)),
-        mu=mu,
+        jacobian=np.reshape(rows, (d * nc, model.nv)),
+        mu=friction[:, 0],
+        mu_s=friction[:, 2] if spin else None,
+        mu_r=friction[:, 3] if rolling else None,
         w=w.ravel(),
         point=np.reshape([found[k].pos for k in active], (nc, 3)),
         frame=np.reshape([found[k].frame for k in active], (nc, 3, 3)),
         bodies=np.reshape(pairs, (nc, 2)).astype(np.int64),
         gap=gap,
     )
-    return contacts, np.reshape(r, (nc, 3)), twist, sorted(notes)
+    return contacts, np.reshape(r, (nc, d)), twist, sorted(notes)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -15,6 +15,14 @@ from fclib._sequence import SUFFIXES
 from fclib.recorders._assemble import Assembled, Contacts
 
 Origin = Literal["exact", "reconstructed"]
+# components of a contact, by their number
+AXES: Final = {
+    2: "N, T",
+    3: "N, T1, T2",
+    4: "N, T1, T2, S",
+    5: "N, T1, T2, R1, R2",
+    6: "N, T1, T2, S, R1, R2",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +49,7 @@ class Recorded:
     def problem(self) -> Any:
         """The problem; the last line of its description, in JSON, tells its origin.
 
-        It is a `GlobalProblem`, or a `LocalProblem` if the engine gives only W.
+        It is global, or a `LocalProblem` if the engine gives only W.
         """
         origin = {
             "generator": "fclib.recorders",
@@ -65,9 +73,9 @@ class Recorded:
         ]
         problem = self.assembled.problem
         equations = "u = W r + q"
-        if isinstance(problem, _core.GlobalProblem):
+        if hasattr(problem, "M"):
             equations = "M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0"
-        axes = "N, T" if problem.spacedim == 2 else "N, T1, T2"
+        axes = AXES[problem.spacedim]
         info = _core.ProblemInfo(
             title=f"{self.engine}, t = {self.time:g} s",
             description="\n".join([*words, json.dumps(origin)]),

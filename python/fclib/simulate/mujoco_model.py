@@ -26,6 +26,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fclib.scenes import Scene
+from fclib.scenes.shared.condim import rolls, spins
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.arrays import (
     Sparse,
@@ -52,13 +53,11 @@ from fclib.simulate.mujoco_scene import (
     UnsupportedSceneError,
     cannot_touch,
     compile_scene,
-    has_condim,
     keyframe_of,
     left_out,
     periodic_cell,
     refuse_out_of_plane,
     refuse_unknown,
-    spins,
 )
 from fclib.simulate.plane import in_plane
 from fclib.simulate.rounding import exponent_of
@@ -134,7 +133,7 @@ class MujocoModel:
         # nor does that of joints alone
         self._dry: DryFriction | None = None
         self._rubbing_tendons = bool(m.tendon_frictionloss.any())
-        self.rolling = has_condim(m, 6)
+        self.rolling = rolls(m)
         # nothing spins in the plane
         self.spin = spins(m) and not scene.planar and "torsion" not in scene.ignore
         # make every detected contact give rows

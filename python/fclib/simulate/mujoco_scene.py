@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from fclib.scenes import Scene
+from fclib.scenes.shared.condim import collides
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Vector
 from fclib.simulate.periodic import PeriodicCell, add_ghosts
@@ -230,32 +231,18 @@ def periodic_cell(scene: Scene, m: Any) -> PeriodicCell:
         raise ValueError(f"{scene.name}: {error}") from None
 
 
-def has_condim(m: Any, condim: int) -> bool:
-    """Whether a contact of the model may have so many components."""
-    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-    return bool(condim in m.geom_condim[collides] or condim in m.pair_dim)
-
-
-def spins(m: Any) -> bool:
-    """Whether a contact of the model may resist spin."""
-    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-    of_shapes = (m.geom_condim >= 4) & collides & (m.geom_friction[:, 1] > 0)
-    of_pairs = (m.pair_dim >= 4) & (m.pair_friction[:, 2] > 0)
-    return bool(of_shapes.any() or of_pairs.any())
-
-
 def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     """The unsupported features of a scene, one line each, without those it ignores on purpose."""
     lost = []
-    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+    touching = collides(m)
     differs = (m.pair_dim > 1) & (m.pair_friction[:, 0] != m.pair_friction[:, 1])
     differs |= (m.pair_dim == 6) & (m.pair_friction[:, 3] != m.pair_friction[:, 4])
     if differs.any() and "anisotropy" not in scene.ignore:
         lost.append("anisotropic friction (the mean of two coefficients)")
-    if softened(m, collides):
+    if softened(m, touching):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
     # a family explains its own parameter
-    if widened(m, collides) and "margin" not in scene.parameters:
+    if widened(m, touching) and "margin" not in scene.parameters:
         lost.append("margins (bodies touch where their surfaces do, limits act where they are)")
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         lost.append("the integrator RK4 (Moreau and Jean's scheme)")
@@ -274,11 +261,11 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     return tuple(lost)
 
 
-def softened(m: Any, collides: Any) -> bool:
+def softened(m: Any, touching: Any) -> bool:
     """Whether a model sets other compliances than MuJoCo's defaults."""
     limited, tied = m.jnt_limited.astype(bool), m.eq_active0.astype(bool)
     rows = (
-        np.hstack((m.geom_solref, m.geom_solimp))[collides],
+        np.hstack((m.geom_solref, m.geom_solimp))[touching],
         np.hstack((m.pair_solref, m.pair_solimp)),
         np.hstack((m.jnt_solref, m.jnt_solimp))[limited],
         np.hstack((m.tendon_solref_lim, m.tendon_solimp_lim))[m.tendon_limited.astype(bool)],
@@ -288,11 +275,11 @@ def softened(m: Any, collides: Any) -> bool:
     return any(bool((own != usual).any()) for own in rows)
 
 
-def widened(m: Any, collides: Any) -> bool:
+def widened(m: Any, touching: Any) -> bool:
     """Whether MuJoCo would hold bodies apart, or stop joints, before they touch or reach limits."""
     limited, tight = m.jnt_limited.astype(bool), m.tendon_limited.astype(bool)
     return bool(
-        (m.geom_margin > m.geom_gap)[collides].any()
+        (m.geom_margin > m.geom_gap)[touching].any()
         or (m.pair_margin > m.pair_gap).any()
         or m.jnt_margin[limited].any()
         or m.tendon_margin[tight].any()

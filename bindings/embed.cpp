@@ -46,6 +46,7 @@ void bind_embed(nb::module_& m) {
          const Maybe<std::int32_t>& columns, bool one_pattern, std::int32_t n_each,
          const Maybe<std::int32_t>& n, const Maybe<double>& M, const Maybe<double>& H,
          const Maybe<double>& f, const Maybe<double>& w, const In<double>& mu,
+         const Maybe<double>& mu_r, const Maybe<double>& mu_s, bool coupled,
          const Maybe<double>& guess, const Out<double>& r, const Out<double>& u,
          const MaybeOut<double>& v, const Out<std::int32_t>& status, const Out<double>& error,
          const Out<std::int32_t>& iterations, double tolerance, int threads, double time_limit) {
@@ -66,6 +67,9 @@ void bind_embed(nb::module_& m) {
         batch.f = data_of(f);
         batch.w = data_of(w);
         batch.mu = mu.data();
+        batch.mu_r = data_of(mu_r);
+        batch.mu_s = data_of(mu_s);
+        batch.coupled = coupled;
         batch.guess = data_of(guess);
         batch.r = r.data();
         batch.u = u.data();
@@ -87,9 +91,9 @@ void bind_embed(nb::module_& m) {
       },
       "spacedim"_a, "count"_a, "each"_a, "nc"_a.none(), "W"_a.none(), "q"_a.none(),
       "starts"_a.none(), "columns"_a.none(), "one_pattern"_a, "n_each"_a, "n"_a.none(),
-      "M"_a.none(), "H"_a.none(), "f"_a.none(), "w"_a.none(), "mu"_a, "guess"_a.none(), "r"_a,
-      "u"_a, "v"_a.none(), "status"_a, "error"_a, "iterations"_a, "tolerance"_a, "threads"_a,
-      "time_limit"_a,
+      "M"_a.none(), "H"_a.none(), "f"_a.none(), "w"_a.none(), "mu"_a, "mu_r"_a.none(),
+      "mu_s"_a.none(), "coupled"_a, "guess"_a.none(), "r"_a, "u"_a, "v"_a.none(), "status"_a,
+      "error"_a, "iterations"_a, "tolerance"_a, "threads"_a, "time_limit"_a,
       "How many problems the solver auto has solved, the first one whose data are not valid (or "
       "-1), and what is wrong with it.");
   const auto solved =

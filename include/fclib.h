@@ -756,7 +756,7 @@ int fclib_sequence_size(const char* path);
  *  set the struct to zeros first, and `size` to sizeof(struct fclib_batch). */
 struct fclib_batch {
   size_t size;
-  int spacedim;        /**< 2 or 3 */
+  int spacedim;        /**< 2 or 3; 3 or 5 with mu_r, 4 with mu_s, 6 with both */
   int count;           /**< problems */
   const int* nc;       /**< contacts of each (count), or NULL: nc_each */
   int nc_each;         /**< contacts of every problem, if nc is NULL */
@@ -788,6 +788,10 @@ struct fclib_batch {
   const double* f;      /**< of each n */
   const double* w_free; /**< w, of each m, or NULL for zeros */
   double* v;            /**< result: of each n; may be NULL */
+  /* other laws than Coulomb's: the solver "auto" solves each of these problems */
+  const double* mu_r; /**< coefficient of rolling friction, of each nc [m], or NULL */
+  const double* mu_s; /**< coefficient of spin friction, of each nc [m], or NULL */
+  int coupled;        /**< 1: sliding and spin share one limit, an ellipsoid (spacedim 4); 0: not */
 };
 
 /** New. Solves all problems of a batch. Small ones have a method of their own, which allocates

@@ -78,6 +78,9 @@ int solve(const fclib_batch* given_batch) {
       }
     }
     batch.mu = need(c.mu, "batch->mu");
+    batch.mu_r = c.mu_r;
+    batch.mu_s = c.mu_s;
+    batch.coupled = c.coupled != 0;
     batch.guess = c.guess;
     batch.r = need(c.r, "batch->r");
     batch.u = c.u;

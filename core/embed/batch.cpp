@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -11,8 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "embed/body_form.hpp"
-#include "embed/small_solver.hpp"
+#include "embed/batch_ways.hpp"
 #include "linalg/workers.hpp"
 #include "solve/driver.hpp"
 
@@ -20,10 +18,10 @@ namespace fclib {
 
 namespace {
 
+using batch::One;
+
 /// The number of problems that a thread takes at once.
 constexpr std::int64_t chunk = 32;
-/// If an island is larger, the problem is for `auto`: the small solver is dense, `auto` is not.
-constexpr Index most_contacts = 64;
 constexpr double poll_interval = 0.1;  // [s]
 
 /// The position of a problem in each array.
@@ -38,34 +36,11 @@ struct Place {
   std::int64_t f = 0;
 };
 
-struct One {
-  Index nc;
-  const double* W;
-  const double* q;
-  BlockView blocks;
-  Index n;
-  const double* M;
-  const double* H;
-  const double* f;
-  const double* w;
-  const double* mu;
-  const double* guess;
-  double* r;
-  double* u;
-  double* v;
-};
-
-bool all_finite(const double* x, std::int64_t size) {
-  double sum = 0;  // zero, or NaN: without a branch
-  for (std::int64_t k = 0; k < size; ++k) sum += x[k] * 0.0;
-  return sum == 0;
-}
-
-template <int D>
+template <class Way>
 class Runner {
  public:
   Runner(const Batch& batch, const BatchSettings& settings)
-      : batch_(batch), settings_(settings), deadline_(settings.time_limit) {
+      : batch_(batch), settings_(settings), d_(batch.spacedim), deadline_(settings.time_limit) {
     if (!varies()) return;
     Place place;
     starts_.reserve(static_cast<std::size_t>(batch.count / chunk + 1));
@@ -110,12 +85,12 @@ class Runner {
   void advance(Place& place, std::int64_t k) const {
     const std::int64_t nc = contacts(k);
     const std::int64_t n = freedoms(k);
-    const std::int64_t m = D * nc;
+    const std::int64_t m = d_ * nc;
     if (batch_.starts == nullptr) {
       place.W += m * m;
     } else {
       const std::int64_t blocks = batch_.starts[place.starts + nc];
-      place.W += D * D * blocks;
+      place.W += d_ * d_ * blocks;
       if (!batch_.one_pattern) {
         place.starts += nc + 1;
         place.columns += blocks;
@@ -133,6 +108,8 @@ class Runner {
       return array == nullptr ? nullptr : array + by;
     };
     One result{};
+    result.spacedim = d_;
+    result.coupled = batch_.coupled;
     result.nc = contacts(k);
     result.n = freedoms(k);
     result.W = at(batch_.W, place.W);
@@ -145,6 +122,8 @@ class Runner {
     result.f = at(batch_.f, place.f);
     result.w = at(batch_.w, place.q);
     result.mu = at(batch_.mu, place.mu);
+    result.mu_r = at(batch_.mu_r, place.mu);
+    result.mu_s = at(batch_.mu_s, place.mu);
     result.guess = at(batch_.guess, place.q);
     result.r = at(batch_.r, place.q);
     result.u = at(batch_.u, place.q);
@@ -155,7 +134,7 @@ class Runner {
   /// One thread: takes chunks as long as there are some.
   void work(bool polls) {
     // each thread keeps this memory: a caller with one problem at a time allocates nothing either
-    thread_local Memory memory;
+    thread_local Way memory;
     BatchOutcome outcome;
     if (polls && settings_.poll) last_poll_ = now({});
     for (;;) {
@@ -217,49 +196,8 @@ class Runner {
     failed_ = k;
   }
 
-  /// What a thread keeps from one problem to the next.
-  struct Memory {
-    SmallSolver<D> solver;
-    BodyForm<D> bodies;
-  };
-
-  /// Takes the data. Returns what is wrong with them, or an empty text.
-  static std::string take(const One& one, Memory& memory) {
-    const std::int64_t m = D * static_cast<std::int64_t>(one.nc);
-    constexpr const char* not_finite = "has an entry that is not finite";
-    if (one.M == nullptr && !all_finite(one.q, m)) return std::string("q: ") + not_finite;
-    for (Index a = 0; a < one.nc; ++a) {
-      if (one.mu[a] >= 0 && std::isfinite(one.mu[a])) continue;
-      return "mu: contact " + std::to_string(a) + " has " + std::to_string(one.mu[a]) +
-             ", expected a finite number that is not negative";
-    }
-    if (one.guess != nullptr && !all_finite(one.guess, m)) {
-      return std::string("guess: ") + not_finite;
-    }
-    const char* wrong = nullptr;
-    if (one.M != nullptr) {
-      wrong = memory.bodies.take({one.n, one.nc, one.M, one.H, one.f, one.w});
-      if (wrong != nullptr) return wrong;
-      wrong = memory.solver.take(one.nc, memory.bodies.W(), memory.bodies.q(), one.mu);
-    } else if (one.blocks.starts != nullptr) {
-      wrong = memory.solver.take(one.nc, one.blocks, one.q, one.mu);
-    } else {
-      wrong = memory.solver.take(one.nc, one.W, one.q, one.mu);
-    }
-    return wrong == nullptr ? std::string() : std::string("W: ") + wrong;
-  }
-
-  /// The merit's error of r, and u and v.
-  static double judge(const One& one, Memory& memory) {
-    if (one.M != nullptr) return memory.bodies.judge(one.mu, one.r, one.u, one.v);
-    return memory.solver.judge(one.r, one.u);
-  }
-
-  void solve_one(std::int64_t k, const One& one, Memory& memory, bool polls,
-                 BatchOutcome& outcome) {
-    const Index nc = one.nc;
-    const Index m = D * nc;
-    SmallSolver<D>& solver = memory.solver;
+  void solve_one(std::int64_t k, const One& one, Way& way, bool polls, BatchOutcome& outcome) {
+    const Index m = d_ * one.nc;
     const auto answer = [&](Status status, double error, std::int64_t iterations) {
       const auto number = static_cast<std::int32_t>(status);
       if (batch_.status != nullptr) {
@@ -272,7 +210,7 @@ class Runner {
       }
       outcome.converged += status == Status::converged ? 1 : 0;
     };
-    if (std::string wrong = take(one, memory); !wrong.empty()) {
+    if (std::string wrong = way.take(one); !wrong.empty()) {
       constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
       std::fill_n(one.r, m, nothing);
       if (one.u != nullptr) std::fill_n(one.u, m, nothing);
@@ -290,74 +228,28 @@ class Runner {
       std::fill_n(one.r, m, 0.0);
     }
     if (const int why = stopped_.load(std::memory_order_relaxed); why >= 0) {
-      const double error = judge(one, memory);
+      const double error = way.judge(one);
       answer(error <= settings_.tolerance ? Status::converged : static_cast<Status>(why), error, 0);
       return;
     }
-    if (solver.largest() <= most_contacts) {
-      const double error = solver.solve(
-          settings_.tolerance, one.r, [&] { return judge(one, memory); }, one.M == nullptr);
-      if (error <= settings_.tolerance) {
-        if (solver.has_velocities() && one.u != nullptr) std::copy_n(solver.velocities(), m, one.u);
-        answer(Status::converged, error, solver.iterations());
-        return;
-      }
+    if (const auto solved = way.solve(one, settings_.tolerance)) {
+      answer(Status::converged, solved->first, solved->second);
+      return;
     }
     ++outcome.by_auto;
-    const Result result = one.M != nullptr ? by_auto(one, global(one), polls)
-                                           : by_auto(one, local(one, memory.solver), polls);
+    const Result result =
+        way.with_problem(one, [&](const auto& problem) { return by_auto(one, problem, polls); });
     std::copy_n(result.solution.r.data(), m, one.r);
     if (one.u != nullptr) std::copy_n(result.solution.u.data(), m, one.u);
     if (one.v != nullptr) std::copy_n(result.solution.v.data(), one.n, one.v);
     answer(result.status, result.error, result.iterations);
   }
 
-  static LocalProblem local(const One& one, const SmallSolver<D>& solver) {
-    LocalProblem problem;
-    problem.spacedim = D;
-    problem.mu = Eigen::Map<const Vector>(one.mu, one.nc);
-    problem.q = Eigen::Map<const Vector>(one.q, D * static_cast<Eigen::Index>(one.nc));
-    problem.W = solver.matrix();
-    return problem;
-  }
-
-  static GlobalProblem global(const One& one) {
-    const auto m = D * static_cast<Eigen::Index>(one.nc);
-    GlobalProblem problem;
-    problem.spacedim = D;
-    problem.mu = Eigen::Map<const Vector>(one.mu, one.nc);
-    problem.f = Eigen::Map<const Vector>(one.f, one.n);
-    problem.w = Vector::Zero(m);
-    if (one.w != nullptr) problem.w = Eigen::Map<const Vector>(one.w, m);
-    problem.M.storage = problem.H.storage = Storage::triplet;
-    problem.M.rows = problem.M.cols = problem.H.rows = one.n;
-    problem.H.cols = static_cast<Index>(m);
-    const auto add = [](Matrix& matrix, Index row, Index col, double value) {
-      if (value == 0) return;
-      matrix.i.push_back(row);
-      matrix.p.push_back(col);
-      matrix.x.push_back(value);
-    };
-    for (Index row = 0; row < one.n; ++row) {
-      for (Index col = 0; col <= row; ++col) {
-        const double value = one.M[static_cast<std::int64_t>(one.n) * row + col];
-        add(problem.M, row, col, value);
-        if (col < row) add(problem.M, col, row, value);
-      }
-    }
-    for (Index col = 0; col < m; ++col) {
-      for (Index row = 0; row < one.n; ++row) {
-        add(problem.H, row, col, one.H[static_cast<std::int64_t>(one.n) * col + row]);
-      }
-    }
-    return problem;
-  }
-
   template <class Problem>
   [[nodiscard]] Result by_auto(const One& one, const Problem& problem, bool polls) {
     Solution guess;
     if (one.guess != nullptr) {
-      guess.r = Eigen::Map<const Vector>(one.guess, D * static_cast<Eigen::Index>(one.nc));
+      guess.r = Eigen::Map<const Vector>(one.guess, d_ * one.nc);
     }
     Settings settings;
     settings.tolerance = settings_.tolerance;
@@ -369,6 +261,7 @@ class Runner {
 
   const Batch& batch_;
   const BatchSettings& settings_;
+  const Index d_;
   Deadline deadline_;
   std::vector<Place> starts_;  // of each chunk, if the sizes vary
   std::atomic<std::int64_t> next_ = 0;
@@ -403,12 +296,27 @@ void check_starts(const Batch& batch) {
   }
 }
 
+/// The coefficients of friction say how many components a contact has.
+void check_law(const Batch& batch) {
+  const bool spin = batch.mu_s != nullptr;
+  const bool rolling = batch.mu_r != nullptr;
+  const auto [least, most] = spin ? std::pair(rolling ? 6 : 4, rolling ? 6 : 4)
+                                  : std::pair(rolling ? 3 : 2, rolling ? 5 : 3);
+  if (batch.spacedim != least && batch.spacedim != most) {
+    refuse("spacedim", "is " + std::to_string(batch.spacedim) + ", expected " +
+                           std::to_string(least) +
+                           (least == most ? "" : " or " + std::to_string(most)) +
+                           (spin ? " with mu_s" : "") + (rolling ? " with mu_r" : ""));
+  }
+  if (batch.coupled && (!spin || rolling)) {
+    refuse("coupled", "is true, and only spacedim 4 has an ellipsoid of sliding and spin");
+  }
+}
+
 }  // namespace
 
 BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
-  if (batch.spacedim != 2 && batch.spacedim != 3) {
-    refuse("spacedim", "is " + std::to_string(batch.spacedim) + ", expected 2 or 3");
-  }
+  check_law(batch);
   if (batch.count < 0) refuse("count", "is negative");
   if (!(settings.tolerance >= 0)) {
     throw Error(ErrorKind::option, "is not a number that is not negative", "tolerance");
@@ -428,8 +336,11 @@ BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
   check_all("nc", batch.nc, batch.nc_each);
   if (batch.M != nullptr) check_all("n", batch.n, batch.n_each);
   if (batch.starts != nullptr) check_starts(batch);
-  if (batch.spacedim == 2) return Runner<2>(batch, settings).run();
-  return Runner<3>(batch, settings).run();
+  if (batch.mu_s != nullptr || batch.mu_r != nullptr) {
+    return Runner<batch::WholeWay>(batch, settings).run();
+  }
+  if (batch.spacedim == 2) return Runner<batch::SmallWay<2>>(batch, settings).run();
+  return Runner<batch::SmallWay<3>>(batch, settings).run();
 }
 
 }  // namespace fclib

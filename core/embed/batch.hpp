@@ -11,10 +11,10 @@
 
 namespace fclib {
 
-/// Problems one behind another, with Coulomb's law at each contact. m = spacedim nc. Either local
-/// ones, u = W r + q, or global ones, M v = H r + f and u = H^T v + w.
+/// Problems one behind another, all with one law of contact. m = spacedim nc. Either local ones, u
+/// = W r + q, or global ones, M v = H r + f and u = H^T v + w.
 struct Batch {
-  int spacedim = 3;                  ///< 2 or 3
+  int spacedim = 3;                  ///< 2 or 3; 3 or 5 with mu_r, 4 with mu_s, 6 with both
   std::int64_t count = 0;            ///< number of problems
   const std::int32_t* nc = nullptr;  ///< contacts of each (count)
   std::int32_t nc_each = 0;          ///< contacts of every problem, if nc is null
@@ -34,6 +34,9 @@ struct Batch {
   const double* f = nullptr;        ///< (n) of each
   const double* w = nullptr;        ///< (m) of each, or null for zeros
   const double* mu = nullptr;       ///< (nc) of each problem
+  const double* mu_r = nullptr;     ///< (nc) of each [m], or null: no rolling friction
+  const double* mu_s = nullptr;     ///< (nc) of each [m], or null: no spin friction
+  bool coupled = false;             ///< sliding and spin share one limit, an ellipsoid
   const double* guess = nullptr;    ///< of r, or null
   // the results; u and all below may be null
   double* r = nullptr;
@@ -61,12 +64,13 @@ struct BatchOutcome {
   std::string wrong;                ///< ... and what is wrong with it
 };
 
-/// Solves all of them. If the fast way does not finish a problem, `auto` solves it. A problem is
-/// converged if its merit is at most the tolerance, as extended precision confirms, or double
-/// precision with a bound on its rounding. The result does not depend on the number of threads.
-/// Problems that time or poll leave undone have r = 0 (or the guess), their merit, and the status
-/// time_limit or interrupted. A problem with an entry that is not finite, a negative mu, or an M
-/// that is not positive definite, has NaN for r, u and v, an infinite error and the status invalid.
+/// Solves all of them. If the fast way does not finish a problem, `auto` solves it; `auto` solves
+/// all with rolling or spin friction. A problem is converged if its merit is at most the tolerance,
+/// as extended precision confirms, or double precision with a bound on its rounding. The result
+/// does not depend on the number of threads. Problems that time or poll leave undone have r = 0 (or
+/// the guess), their merit, and the status time_limit or interrupted. A problem with an entry that
+/// is not finite, a negative coefficient of friction, or an M that is not positive definite, has
+/// NaN for r, u and v, an infinite error and the status invalid.
 ///
 /// Throws Error (problem) if the sizes make no sense, so that nobody knows where a problem begins.
 BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings = {});

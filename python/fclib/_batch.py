@@ -62,6 +62,48 @@ class BatchResult(EqualByEntries):
         )
 
 
+@dataclass(frozen=True)
+class Law:
+    """The coefficients of friction of a batch, as the caller gives them."""
+
+    mu: Any
+    mu_r: Any = None
+    mu_s: Any = None
+    coupled: bool = False
+
+    @property
+    def turns(self) -> bool:
+        """Whether contacts resist rolling or spin."""
+        return self.mu_r is not None or self.mu_s is not None
+
+    def check(self, spacedim: int) -> None:
+        """ProblemError if the law has no contacts of so many components."""
+        rolls, spins = self.mu_r is not None, self.mu_s is not None
+        known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}
+        if spacedim not in (fits := known.get((rolls, spins), (6,))):
+            given = [name for name in ("mu_r", "mu_s") if getattr(self, name) is not None]
+            words = f"expected {' or '.join(map(str, fits))}"
+            raise _core.ProblemError(
+                f"spacedim: is {spacedim}, {words}"
+                + (f" as there is {' and '.join(given)}" if given else "")
+            )
+        if self.coupled and (rolls or not spins):
+            raise _core.ProblemError("coupled: is for spacedim 4, which has mu_s")
+
+    def spread(
+        self, shape: tuple[int, ...], counts: npt.NDArray[np.int32] | None = None
+    ) -> dict[str, Any]:
+        """The coefficients of all contacts, one after another, as the core names them."""
+        found: dict[str, Any] = {"coupled": self.coupled}
+        for name in ("mu", "mu_r", "mu_s"):
+            values = getattr(self, name)
+            if values is not None:
+                given = values if counts is None else flat(name, values, counts)
+                values = broadcast(name, given, shape).reshape(-1)
+            found[name] = values
+        return found
+
+
 def solve_batch(
     W: Any = None,
     q: Any = None,
@@ -71,6 +113,9 @@ def solve_batch(
     inverse_mass: Any = None,
     velocity: Any = None,
     spacedim: int = 3,
+    mu_r: Any = None,
+    mu_s: Any = None,
+    coupled: bool = False,
     contacts: Any = None,
     pattern: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     guess: Any = None,
@@ -79,7 +124,7 @@ def solve_batch(
     time_limit: float | None = None,
     unsolved: Literal["cpu", "leave"] = "cpu",
 ) -> Any:
-    """Solve many local problems, u = W r + q with Coulomb's law, without Python between them.
+    """Solve many local problems, u = W r + q with one law, without Python between them.
 
     Small problems have their own method, which allocates no memory for each. Contacts that no block
     of W connects are solved apart from each other. Problems that the method does not solve go to
@@ -99,7 +144,10 @@ def solve_batch(
             it is diagonal, or (count, coordinates, coordinates).
         velocity: (count, coordinates) free velocities of the bodies: q = J velocity, and what is
             given as q besides.
-        spacedim: 3, or 2 for planar problems.
+        spacedim: 3, or 2 for planar problems; 5 (3) with mu_r, 4 with mu_s, 6 with both.
+        mu_r: coefficients of rolling friction [m], as mu. Then ``auto`` solves each problem.
+        mu_s: coefficients of spin friction [m], likewise.
+        coupled: whether sliding and spin share one limit, an ellipsoid (spacedim 4).
         contacts: (count,) numbers of contacts, if they differ between problems.
         pattern: (starts, columns) of the blocks of every W, as ``indptr`` and ``indices`` of
             SciPy's bsr_array: starts (nc + 1), columns (blocks).
@@ -125,7 +173,9 @@ def solve_batch(
         ProblemError: sizes that do not agree.
         OptionError: tol, threads or time_limit out of range.
     """
-    check_options(spacedim, tol, threads, time_limit)
+    law = Law(mu, mu_r, mu_s, coupled)
+    law.check(spacedim)
+    check_options(tol, threads, time_limit)
     if unsolved not in ("cpu", "leave"):
         raise _core.OptionError(f'unsolved: is {unsolved!r}, expected "cpu" or "leave"')
     if jacobian is None and (inverse_mass is not None or velocity is not None):
@@ -135,6 +185,10 @@ def solve_batch(
     if mu is None:
         raise _core.ProblemError("mu: is missing")
     if _device.on_device(W, q, mu, jacobian, inverse_mass, velocity, contacts, guess):
+        if law.turns:
+            raise _core.ProblemError(
+                "mu_r, mu_s: are for arrays on the CPU; a GPU has Coulomb's law"
+            )
         return _device.solve_batch(
             W,
             q,
@@ -178,7 +232,7 @@ def solve_batch(
         else:
             matrices = shaped("W", flat("W", W, lengths**2), (int(np.sum(lengths**2)),))
         velocity = shaped("q", flat("q", q, lengths), sizes)
-        friction = broadcast("mu", flat("mu", mu, counts), (int(counts.sum()),))
+        friction = law.spread((int(counts.sum()),), counts)
         start = None if guess is None else shaped("guess", flat("guess", guess, lengths), sizes)
     else:
         if pattern is None:
@@ -193,7 +247,7 @@ def solve_batch(
             if m % spacedim:
                 raise _core.ProblemError(f"W: m = {m} is no multiple of spacedim = {spacedim}")
             each = m // spacedim
-        friction = broadcast("mu", mu, (count, each))
+        friction = law.spread((count, each))
         velocity = shaped("q", q, sizes)
         start = None if guess is None else shaped("guess", guess, sizes)
     given = {
@@ -209,10 +263,8 @@ def solve_batch(
     )  # fmt: skip
 
 
-def check_options(spacedim: int, tol: float, threads: int, time_limit: float | None) -> None:
-    """ProblemError or OptionError if one is out of range."""
-    if spacedim not in (2, 3):
-        raise _core.ProblemError(f"spacedim: is {spacedim}, expected 2 or 3")
+def check_options(tol: float, threads: int, time_limit: float | None) -> None:
+    """OptionError if one is out of range."""
     if not tol >= 0:
         raise _core.OptionError(f"tol: {tol} is not a positive number")
     if threads < 0:
@@ -239,7 +291,7 @@ def run(
     counts: npt.NDArray[np.int32] | None,
     offsets: npt.NDArray[np.int64] | None,
     shape: tuple[int, ...],
-    mu: Floats,
+    friction: dict[str, Any],
     guess: Floats | None,
     v: Floats | None,
     tol: float,
@@ -252,6 +304,7 @@ def run(
     error = np.empty(count)
     iterations = np.empty(count, dtype=np.int32)
     names = ("W", "q", "starts", "columns", "n", "M", "H", "f", "w")
+    arrays: dict[str, Any] = {name: given.get(name) for name in names}
     by_auto, first, wrong = _core.solve_batch(
         spacedim=spacedim,
         count=count,
@@ -259,8 +312,8 @@ def run(
         nc=counts,
         one_pattern=given.get("one_pattern", False),
         n_each=given.get("n_each", 0),
-        **{name: given.get(name) for name in names},
-        mu=mu.reshape(-1),
+        **arrays,
+        **friction,
         guess=None if guess is None else guess.reshape(-1),
         r=r.reshape(-1),
         u=u.reshape(-1),
@@ -429,7 +482,7 @@ def flat(name: str, values: Any, sizes: npt.NDArray[Any]) -> Any:
         )
     parts = [floats(name, one).reshape(-1) for one in values]
     for k, (part, size) in enumerate(zip(parts, sizes, strict=True)):
-        if part.size != size and not (name == "mu" and part.size == 1):
+        if part.size != size and not (name.startswith("mu") and part.size == 1):
             raise _core.ProblemError(
                 f"{name}: problem {k} has {part.size} entries, expected {size}"
             )

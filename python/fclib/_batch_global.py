@@ -9,7 +9,7 @@ import numpy as np
 from fclib import _core
 from fclib._batch import (
     BatchResult,
-    broadcast,
+    Law,
     check_contacts,
     check_options,
     flat,
@@ -27,12 +27,15 @@ def solve_batch_global(
     *,
     w: Any = None,
     spacedim: int = 3,
+    mu_r: Any = None,
+    mu_s: Any = None,
+    coupled: bool = False,
     guess: Any = None,
     tol: float = 1e-8,
     threads: int = 1,
     time_limit: float | None = None,
 ) -> BatchResult:
-    """Solve many global problems, M v = H r + f and u = H^T v + w with Coulomb's law.
+    """Solve many global problems, M v = H r + f and u = H^T v + w with one law.
 
     H is the transpose of the contacts' Jacobian: a simulator's J (count, m, n) is given as
     ``J.swapaxes(1, 2)``, which copies nothing. W is made in the core. Bodies that no contact
@@ -45,7 +48,10 @@ def solve_batch_global(
         mu: (count, nc) coefficients of friction, or anything that NumPy broadcasts to it. Of lists,
             a list or a number.
         w: (count, m) velocities; None for zeros.
-        spacedim: 3, or 2 for planar problems.
+        spacedim: 3, or 2 for planar problems; 5 (3) with mu_r, 4 with mu_s, 6 with both.
+        mu_r: coefficients of rolling friction [m], as mu. Then ``auto`` solves each problem.
+        mu_s: coefficients of spin friction [m], likewise.
+        coupled: whether sliding and spin share one limit, an ellipsoid (spacedim 4).
         guess: (count, m) reactions to start from.
         tol: bound on Merit.error of each.
         threads: number of threads that share the batch; 0: all of the machine.
@@ -58,7 +64,9 @@ def solve_batch_global(
         ProblemError: sizes that do not agree.
         OptionError: tol, threads or time_limit out of range.
     """
-    check_options(spacedim, tol, threads, time_limit)
+    law = Law(mu, mu_r, mu_s, coupled)
+    law.check(spacedim)
+    check_options(tol, threads, time_limit)
     given: dict[str, Any]
     if isinstance(M, (list, tuple)):
         for name, values in (("H", H), ("f", f)):
@@ -91,7 +99,7 @@ def solve_batch_global(
         }
         if w is not None:
             given["w"] = shaped("w", flat("w", w, lengths), shape)
-        friction = broadcast("mu", flat("mu", mu, counts), (int(counts.sum()),))
+        friction = law.spread((int(counts.sum()),), counts)
         start = None if guess is None else shaped("guess", flat("guess", guess, lengths), shape)
         v = np.empty(int(n.sum()))
         return run(
@@ -117,7 +125,7 @@ def solve_batch_global(
     }
     if w is not None:
         given["w"] = shaped("w", w, (count, m)).reshape(-1)
-    friction = broadcast("mu", mu, (count, each))
+    friction = law.spread((count, each))
     start = None if guess is None else shaped("guess", guess, (count, m))
     return run(
         given, spacedim, count, each, None, None, (count, m), friction, start,

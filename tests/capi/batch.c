@@ -102,6 +102,26 @@ int main(void) {
     CHECK(fabs(r[0] - 0.5) < 1e-12 && fabs(r[1] + 0.25) < 1e-12 && fabs(v[0] - 4.5) < 1e-12);
     CHECK(fabs(v[2]) < 1e-12 && fabs(u[1] - 4.5) < 1e-12);
   }
+  { /* a contact that spins at the limit of its moment: m_N = -mu_s r_N */
+    const double unit[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    const double turning[4] = {-1, 0, 0, 5};
+    const double sliding = 0.5, spin = 0.1;
+    struct fclib_batch other;
+    double moments[4];
+    memset(&other, 0, sizeof other);
+    other.size = sizeof other;
+    other.spacedim = 4;
+    other.count = 1;
+    other.nc_each = 1;
+    other.W = unit;
+    other.q = turning;
+    other.mu = &sliding;
+    other.r = moments;
+    CHECK(fclib_solve_batch(&other) == 0 && strstr(fclib_last_error(), "spacedim"));
+    other.mu_s = &spin;
+    CHECK(fclib_solve_batch(&other) == 1);
+    CHECK(fabs(moments[0] - 1) < 1e-7 && fabs(moments[3] + 0.1) < 1e-7);
+  }
   { /* the second contact slides: r_T = -mu r_N, r_N = -q_N / 2 */
     struct fclib_derivatives by;
     double dq[6] = {0, 0, 0, 1, 0, 0}, dmu[2] = {0, 0}, dr[6], du[6], dW[18];

@@ -314,6 +314,88 @@ def test_planted_answers_with_masses_of_all_sizes(tol: float) -> None:
         assert error <= found.error[k] <= tol
 
 
+LAWS = [(3, "rolling"), (5, "rolling"), (4, "spin"), (4, "ellipsoid"), (6, "spin")]
+
+
+@pytest.mark.parametrize(("spacedim", "law"), LAWS)
+def test_contacts_that_resist_rolling_and_spin(spacedim: int, law: str) -> None:
+    """Local, by blocks, of all sizes, and global: as one by one, and judged by the merit."""
+    rng = np.random.default_rng(spacedim)
+    count, nc, n = 12, 3, 20
+    H = rng.normal(size=(count, n, spacedim * nc))
+    mass, w = rng.uniform(0.5, 2, (count, n)), rng.normal(size=(count, spacedim * nc))
+    mu = rng.uniform(0, 1, (count, nc))
+    turning: dict[str, Any] = {"mu_r": rng.uniform(0, 0.2, (count, nc))}
+    if law != "rolling":
+        rolls = turning if spacedim == 6 else {}
+        turning = {**rolls, "mu_s": rng.uniform(0, 0.2, (count, nc)), "coupled": law == "ellipsoid"}
+    W = np.einsum("kij,ki,kil->kjl", H, 1 / mass, H)
+    found = fclib.solve_batch(W, w, mu, spacedim=spacedim, **turning)
+    assert found.converged.all()
+    assert found.by_auto == count
+    of_bodies = fclib.solve_batch_global(
+        np.stack([np.diag(m) for m in mass]), H, np.zeros((count, n)), mu, w=w, spacedim=spacedim,
+        threads=2, **turning,
+    )  # fmt: skip
+    assert of_bodies.converged.all()
+    kind: Any = fclib.LocalRollingProblem if law == "rolling" else fclib.LocalSpinProblem
+    for k in range(count):
+        own = {name: value[k] for name, value in turning.items() if name != "coupled"}
+        if law != "rolling":
+            own["coupled"] = int(turning["coupled"])
+        problem = kind(spacedim=spacedim, W=W[k], q=w[k], mu=mu[k], **own)
+        for batch in (found, of_bodies):
+            solution = fclib.Solution(r=batch.r[k], u=batch.u[k])
+            assert fclib.merit(problem, solution).error <= 1.01e-8
+        assert batch.v is not None
+        np.testing.assert_allclose(mass[k] * batch.v[k], H[k] @ batch.r[k], atol=1e-12)
+        np.testing.assert_array_equal(found.r[k], fclib.solve(problem).solution.r)
+    # by blocks, and as lists of several sizes
+    starts, columns = nc * np.arange(nc + 1), np.tile(np.arange(nc), nc)
+    blocks = W.reshape(count, nc, spacedim, nc, spacedim).swapaxes(2, 3)
+    blocks = blocks.reshape(count, nc * nc, spacedim, spacedim)
+    by_blocks = fclib.solve_batch(
+        blocks, w, mu, spacedim=spacedim, pattern=(starts, columns), **turning
+    )
+    assert by_blocks.converged.all()
+    np.testing.assert_allclose(by_blocks.u, found.u, atol=1e-6)
+    d = spacedim
+    mixed: dict[str, Any] = {name: value if name == "coupled" else [value[0], value[1][:1]]
+             for name, value in turning.items()}  # fmt: skip
+    lists = fclib.solve_batch(
+        [W[0], W[1][:d, :d]], [w[0], w[1][:d]], [mu[0], mu[1][:1]], spacedim=d, **mixed
+    )
+    assert lists.converged.all()
+    np.testing.assert_array_equal(lists.r[: nc * d], found.r[0])
+
+
+def test_wrong_moments_are_named() -> None:
+    W, q = np.stack([np.eye(4)] * 3), -np.ones((3, 4))
+    mu_s = np.array([[0.1], [-1], [0.1]])
+    found = fclib.solve_batch(W, q, 0.5, spacedim=4, mu_s=mu_s)
+    assert found.converged.tolist() == [True, False, True]
+    assert found.statuses[found.status[1]] == "invalid"
+    assert np.isnan(found.r[1]).all()
+    assert found.wrong.startswith("problem 1: mu_s: contact 0 has -1")
+    M = np.stack([np.eye(4), -np.eye(4)])
+    bad = fclib.solve_batch_global(M, M, q[:2], 0.5, spacedim=4, mu_s=0.1, coupled=True)
+    assert bad.converged.tolist() == [True, False]
+    assert "positive definite" in bad.wrong
+    late = fclib.solve_batch(W, q, 0.5, spacedim=4, mu_s=0.1, time_limit=1e-12)
+    assert {late.statuses[k] for k in late.status} == {"time_limit"}
+    assert (late.u == q).all()
+    change: dict[str, Any]
+    for change, words in (
+        ({"spacedim": 3, "mu_s": 0.1}, "is 3, expected 4 as there is mu_s"),
+        ({"spacedim": 4}, "is 4, expected 2 or 3"),
+        ({"spacedim": 4, "mu_r": 0.1, "mu_s": 0.1}, "expected 6 as there is mu_r and mu_s"),
+        ({"spacedim": 3, "coupled": True}, "coupled: is for spacedim 4"),
+        ({"spacedim": 4, "mu_s": np.ones((2, 2))}, "mu_s: has the shape"),
+    ):
+        with pytest.raises(fclib.ProblemError, match=words):
+            fclib.solve_batch(W, q, 0.5, **change)
+
+
 def test_derivatives_of_a_batch_are_those_of_each() -> None:
     W, q, mu, _, _ = planted(3, 25, seed=4)
     r = fclib.solve_batch(W, q, mu, tol=1e-13).r

@@ -60,7 +60,14 @@ MENU = {
         "recorders",
     ],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
-    "The bench": ["bench", "one-run", "measurement", "published-runs", "report"],
+    "The bench": [
+        "bench",
+        "one-run",
+        "measurement",
+        "published-runs",
+        "published-results",
+        "report",
+    ],
     "Interfaces": [
         "command-line",
         "python",

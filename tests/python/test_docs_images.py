@@ -34,7 +34,9 @@ def script() -> Any:
 
 def test_every_picture_is_made_by_the_script_and_shown(script: Any) -> None:
     there = {path.stem for path in (DOCS / "images").iterdir()}
-    assert there == set(script.names())
+    # those of the published runs are made with their page, by workshop.tables.published
+    published = {name for name in there if name.startswith("published-")}
+    assert there == set(script.names()) | published
     text = "".join(path.read_text(encoding="utf-8") for path in [*DOCS.glob("*.md")])
     text += (ROOT / "README.md").read_text(encoding="utf-8")
     assert there == set(re.findall(r"images/([\w-]+)\.png", text))

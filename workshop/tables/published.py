@@ -159,9 +159,8 @@ def of_sets(
     if noise:
         yield from ("## How much is noise?", "")
         yield from prose(
-            "A tenth of the problems is solved three times, in another order, and on "
-            "renumbered copies. The table has by how much the slowest of the copies takes "
-            "longer than the fastest."
+            "Some runs are repeated at other times, on renumbered copies of the problem. The table "
+            "has by how much the slowest of them takes longer than the fastest."
         )
         yield from table("published-noise", noise, "The spread of repeats", "")
     yield from ("## Who solves how much, and how fast?", "")
@@ -195,6 +194,7 @@ def of_sets(
                      "The virtual best, and the best two and three solvers together",
                      "Chosen in hindsight: nobody knows it before.")  # fmt: skip
     yield from ("## What follows?", "")
+    yield from ("<!-- figures: the level of the intervals, which is set -->", "")
     yield from prose(
         "A statement is carried by the data if its 95 % interval lies on one side of the bound."
     )
@@ -332,7 +332,12 @@ def draw(name: str, drawing: Callable[[Path], None]) -> None:
 
 def image(name: str, words: str) -> list[str]:
     """The lines of a page that show a picture."""
-    return [f'<img src="images/{name}.png" width="700"', f'     alt="{words}">', ""]
+    return [
+        "<!-- figures: the tolerance, which is set -->",
+        f'<img src="images/{name}.png" width="700"',
+        f'     alt="{words}">',
+        "",
+    ]
 
 
 # ---- failures and kinds

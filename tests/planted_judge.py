@@ -380,7 +380,7 @@ class Said(NamedTuple):
 
     word: str
     solver: str
-    rolling: bool
+    law: str
 
     @property
     def false(self) -> bool:
@@ -388,7 +388,14 @@ class Said(NamedTuple):
         return self.word.startswith("false")
 
 
-def in_turn(problem: Any, number: int, solver: str) -> str:
+def law_of(problem: Any) -> str:
+    """The law of a problem's contacts, in words."""
+    if problem.kind.endswith("spin"):
+        return "ellipsoid" if problem.coupled else f"spin{', rolling' * (problem.spacedim == 6)}"
+    return "rolling" if problem.kind.endswith("rolling") else "Coulomb"
+
+
+def drawn(problem: Any, number: int, solver: str) -> str:
     """The solver, or for `each` one of the built-in solvers that take the problem."""
     if solver != "each":
         return solver
@@ -397,7 +404,8 @@ def in_turn(problem: Any, number: int, solver: str) -> str:
         for one in fclib.solvers()
         if one.origin == "fclib" and problem.spacedim in _registry.dimensions_of(one, problem.kind)
     ]
-    return takers[number % len(takers)]
+    # by chance, since the laws come in turn
+    return takers[np.random.default_rng([number, 2034]).integers(len(takers))]
 
 
 def limit_of_iterations(solver: str) -> int:
@@ -463,8 +471,8 @@ def verdict(
 ) -> Said:
     """What a solver says of a problem, and the merit of its solution."""
     problem, solution, guess = plant(number)
-    solver = in_turn(problem, number, solver)
-    return Said(word_on(problem, solution, guess, solve, solver), solver, hasattr(problem, "mu_r"))
+    solver = drawn(problem, number, solver)
+    return Said(word_on(problem, solution, guess, solve, solver), solver, law_of(problem))
 
 
 def word_on(
@@ -551,8 +559,8 @@ def claim(
 ) -> Said:
     """What a solver says of a problem without a solution."""
     problem = without_solution(number)
-    solver = in_turn(problem, number, solver)
-    return Said(word_without(problem, solve, solver), solver, hasattr(problem, "mu_r"))
+    solver = drawn(problem, number, solver)
+    return Said(word_without(problem, solve, solver), solver, law_of(problem))
 
 
 def word_without(problem: Any, solve: Callable[..., fclib.Result], solver: str) -> str:
@@ -582,8 +590,8 @@ def contradiction(number: int, solver: str = "auto", little: bool = False) -> Sa
     b = problem.b.copy()
     b[-1] += gap if little else 1.0
     problem = problem.replace(b=b)
-    solver = in_turn(problem, number, solver)
-    return Said(word_on_joints(problem, z, little, solver), solver, False)
+    solver = drawn(problem, number, solver)
+    return Said(word_on_joints(problem, z, little, solver), solver, law_of(problem))
 
 
 def word_on_joints(problem: Any, z: Array, little: bool, solver: str) -> str:
@@ -606,7 +614,7 @@ def word_on_joints(problem: Any, z: Array, little: bool, solver: str) -> str:
 def damaged(number: int, solver: str = "") -> Said:
     """What is said of a file of which a part is missing; no solver is asked."""
     problem, solution, _ = planted(number)
-    return Said(word_on_file(number, problem, solution), solver, hasattr(problem, "mu_r"))
+    return Said(word_on_file(number, problem, solution), solver, law_of(problem))
 
 
 def word_on_file(number: int, problem: Any, solution: fclib.Solution) -> str:

@@ -11,9 +11,9 @@ rolling, guesses) and those that ask for all digits (`digits` there). Left out a
 data do not hold their own solution to a tenth of the tolerance. CPU time is that of all solves of a
 kind.
 
-With --each, all built-in solvers in turn get the problems of all regimes of tests/planted_judge.py
-that have a solution, until there are COUNT with rolling friction and COUNT without. Each word is
-judged in ball arithmetic, and the merits of wrong solutions with it.
+With --each, the problems of all regimes of tests/planted_judge.py that have a solution go to one of
+the built-in solvers each, until there are COUNT of each law. Each word is judged in ball
+arithmetic, and the merits of wrong solutions with it.
 """
 
 from __future__ import annotations
@@ -55,29 +55,39 @@ def counted(plant: Any, numbers: range, chain: list[str] | None) -> dict[str, An
     return {"problems": problems, "solved": solved, "false words": false, "CPU time [s]": spent}
 
 
-SOLVABLE = ("random", "digits", "corners", "held limits")
+# regimes with a solution, and the laws of their problems
+SOLVABLE = {
+    ("random", "digits", "corners", "held limits"): ("Coulomb", "rolling"),
+    ("spin",): ("spin", "spin, rolling", "ellipsoid"),
+}
 
 
 def by_solver(count: int, first: int) -> list[dict[str, Any]]:
     """A row for each built-in solver: what it was given, solved, and said that was false."""
-    titles = ("rolling", "rolling, solved", "others", "others, solved", "false words")
+    laws = [law for own in SOLVABLE.values() for law in own]
+    titles = [f"{law}{words}" for law in laws for words in ("", ", solved")] + ["false words"]
     found: dict[str, dict[str, int]] = {}
-    given = {True: 0, False: 0}
+    given = dict.fromkeys(laws, 0)
     for number in itertools.count(first):
-        for regime in SOLVABLE:
+        wanted = [
+            regime
+            for regimes, own in SOLVABLE.items()
+            if min(given[law] for law in own) < count
+            for regime in regimes
+        ]
+        if not wanted:
+            break
+        for regime in wanted:
             said = planted_judge.REGIMES[regime](number, solver="each")
             if said.word == "rounding":
                 continue
             row = found.setdefault(said.solver, dict.fromkeys(titles, 0))
-            law = "rolling" if said.rolling else "others"
-            row[law] += 1
-            row[f"{law}, solved"] += said.word == "converged"
+            row[said.law] += 1
+            row[f"{said.law}, solved"] += said.word == "converged"
             row["false words"] += said.false
-            given[said.rolling] += 1
+            given[said.law] += 1
             if said.false:
                 print(f"{regime} {number}: {said.solver}: {said.word}", flush=True)
-        if min(given.values()) >= count:
-            break
     rows = [{"solver": solver, **found[solver]} for solver in sorted(found)]
     return [*rows, {"solver": "all", **{x: sum(row[x] for row in rows) for x in titles}}]
 

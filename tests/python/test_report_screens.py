@@ -360,6 +360,7 @@ def test_all_pages_count_the_same_problems(browser: Any, site: Path) -> None:
     whole = f"{{}} of {known['problems']} problems and {{}} of {copies}"
     assert said.inner_text() == whole.format(known["problems"], known["copies"])
     (family,) = (one for one in known["families"] if one["copies"])
+    assert sum(family["histograms"][0]["counts"]) == family["problems"]
     others = whole.format(known["problems"] - family["problems"], 0)
     page.get_by_label("filter").fill(f"family != {family['name']}")
     page.get_by_text(others, exact=True).wait_for()

@@ -632,7 +632,8 @@ def described_merits() -> list[list[str | None]]:
 
 
 def _histograms(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """How the measures of a family are distributed over its problems."""
+    """How the measures of a family are distributed over its different problems."""
+    rows = list({row.get("same_as") or row["id"]: row for row in rows}.values())
     found = []
     for key, _ in MEASURES:
         values = [row[key] for row in rows if row.get(key) is not None]

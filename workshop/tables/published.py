@@ -40,6 +40,7 @@ Row: TypeAlias = dict[str, Any]
 
 WEIGH: Final[profiles.Weigh] = "families"
 DRAWN: Final = 10  # solvers in a picture
+SHOWN: Final = 5  # families with failures that a row names
 PAGE: Final = _results.ROOT / "docs" / "published-results.md"
 IMAGES: Final = _results.ROOT / "docs" / "images"
 SEQUENCES: Final = "sequences"  # the set whose runs are along sequences
@@ -172,7 +173,7 @@ def of_sets(
     if failures:
         yield from ("## Who fails where, and why?", "")
         yield from table("published-failures", failures, "What ends the runs that fail",
-                         "Each solver on what it has run and takes.")  # fmt: skip
+                         "Each solver on the problems that it has run and takes.")  # fmt: skip
     yield from ("## Which family of methods for which kind of problem?", "")
     yield from table("published-kinds", [row for one in sets for row in kind_rows(one)],
                      "The best of each family of methods, by kind of problem",
@@ -344,27 +345,32 @@ def image(name: str, words: str) -> list[str]:
 
 
 def failure_rows(one: Set) -> list[Row]:
-    """By family, tolerance and solver: how many are solved, and how the others ended."""
-    groups: dict[tuple[str, float, str], Counter[str]] = defaultdict(Counter)
+    """By tolerance and solver: what ended the runs that failed, and in which families most did."""
+    ends: dict[tuple[float, str], Counter[str]] = defaultdict(Counter)
+    failed: dict[tuple[float, str], Counter[str]] = defaultdict(Counter)
     for row in one.rows:
-        if row["status"] != "unsuitable" and not row["copy"]:
-            groups[row["family"], -row["tol"], row["solver"].partition(" (")[0]][row["status"]] += 1
-    found = []
-    for (family, tol, solver), ends in sorted(groups.items()):
-        failed = {name: n for name, n in ends.most_common() if not is_solved(name)}
-        count = sum(ends.values())
-        if failed:
-            found.append(
-                {
-                    "set": one.name,
-                    "family": family,
-                    "tolerance": _results.power(-tol),
-                    "solver": solver,
-                    "solved": f"{count - sum(failed.values())} of {count}",
-                    "ends": ", ".join(f"{n} {name}" for name, n in failed.items()),
-                }
-            )
-    return found
+        if row["status"] == "unsuitable" or row["copy"]:
+            continue
+        own = -row["tol"], row["solver"].partition(" (")[0]
+        if is_solved(row["status"]):
+            ends[own]["solved"] += 1
+        else:
+            ends[own][row["status"]] += 1
+            failed[own][row["family"]] += 1
+    names = sorted({name for count in ends.values() for name in count} - {"solved"})
+    return [
+        {
+            "set": one.name,
+            "tolerance": _results.power(-tol),
+            "solver": solver,
+            "solved": count["solved"],
+            **{name: count[name] for name in names},
+            "families with most failures": ", ".join(
+                f"{family} {n}" for family, n in failed[tol, solver].most_common(SHOWN)
+            ),
+        }
+        for (tol, solver), count in sorted(ends.items())
+    ]
 
 
 def methods_of(one: Set) -> dict[str, list[str]]:
@@ -391,7 +397,7 @@ def best_in(costs: Costs, solvers: Sequence[str]) -> tuple[str, Array]:
 
 
 def kind_rows(one: Set) -> list[Row]:
-    """By kind, tolerance and family of methods: its best solver."""
+    """By kind and tolerance: the best solver of each family of methods."""
     found = []
     for tol in one.tolerances:
         costs = one.costs.at(tol)
@@ -400,22 +406,22 @@ def kind_rows(one: Set) -> list[Row]:
             kinds[kind_of(instance.family)].append(k)
         for kind, places in sorted(kinds.items()):
             part = costs.on_instances(places)
+            row = {
+                "set": one.name,
+                "tolerance": _results.power(tol),
+                "kind": kind,
+                "problems": len(places),
+            }
             for method, solvers in methods_of(one).items():
                 name, values = best_in(part, solvers)
                 solved = int(np.isfinite(values).sum())
                 both = np.isfinite(values) & np.isfinite(part.best)
-                ratio = np.exp(np.log(values[both] / part.best[both]).mean()) if solved else ""
-                found.append(
-                    {
-                        "set": one.name,
-                        "kind": kind,
-                        "tolerance": _results.power(tol),
-                        "methods": method,
-                        "best solver": name.partition(" (")[0],
-                        "solved": f"{solved} of {len(values)}",
-                        "mean ratio to the best of all": ratio,
-                    }
-                )
+                words = f"{name.partition(' (')[0]} {solved}"
+                if solved:
+                    ratio = np.exp(np.log(values[both] / part.best[both]).mean())
+                    words += f", {ratio:.2g} x"
+                row[method] = words
+            found.append(row)
     return found
 
 

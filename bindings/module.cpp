@@ -46,6 +46,7 @@ NB_MODULE(_core, m) {
   bind_arrangements(m);
   bind_solvers(m);
   bind_embed(m);
+  bind_stepping(m);
   bind_merits(m);
   bind_files(m);
   bind_sequences(m);

@@ -48,6 +48,8 @@ void bind_solvers(nb::module_& m);
 void bind_python_solvers(nb::module_& m);
 /// Batches of small problems.
 void bind_embed(nb::module_& m);
+/// The arithmetic of a time step.
+void bind_stepping(nb::module_& m);
 /// Merit, merit, merit_1 and contact_merits.
 void bind_merits(nb::module_& m);
 /// Files: HDF5 and the text of Siconos.

@@ -36,7 +36,7 @@ LAYERS: list[set[str]] = [
     {"reduced"},
     {"systems"},
     {"solve"},
-    {"embed"},
+    {"embed", "stepping"},
     {"methods"},
     {"chain"},
     {"solvers", "solver_table.cpp"},

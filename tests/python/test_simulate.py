@@ -30,7 +30,6 @@ from fclib.simulate import (  # noqa: E402
     render,
     simulate,
 )
-from fclib.simulate.arrays import added  # noqa: E402
 from fclib.simulate.equalities import are_independent, dependence  # noqa: E402
 from workshop.tables import loop_rounding  # noqa: E402
 
@@ -1297,21 +1296,3 @@ def test_warm_start_in_the_plane_knows_the_reactions() -> None:
 def test_planar_scene_refuses_what_leaves_the_plane(bodies: str, message: str) -> None:
     with pytest.raises(UnsupportedSceneError, match=message):
         planar(mjcf(bodies, x=0, mu_r=0), 1)
-
-
-@pytest.mark.parametrize("missing", [None, 2])
-def test_a_diagonal_is_added_as_scipy_does(missing: int | None) -> None:
-    """Onto one that is there and onto one with a gap; what cancels is no entry."""
-    full = sp.csc_array(np.array([[4.0, 1, 0, 0], [1, 0.3, 0, 0], [0, 0, 5, 0], [0, 0, 0, 0.1]]))
-    if missing is not None:
-        full[missing, missing] = 0
-        full.eliminate_zeros()
-    for values in ([0.0, 0.7, 0.1, 0.0], [0.0, 0.0, 0.0, -0.2]):
-        other = sp.csc_array(sp.diags_array(values))
-        other.eliminate_zeros()
-        expected = sp.csc_array(full + 0.5 * other)
-        expected.eliminate_zeros()
-        found = added(full, 0.5, other)
-        np.testing.assert_array_equal(found.indptr, expected.indptr)
-        np.testing.assert_array_equal(found.indices, expected.indices)
-        np.testing.assert_array_equal(found.data, expected.data)

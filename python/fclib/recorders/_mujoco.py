@@ -26,7 +26,7 @@ from fclib.recorders._assemble import (
     assemble,
 )
 from fclib.recorders._recorded import Recorded, SetupError
-from fclib.scenes.shared.condim import rolls, spins
+from fclib.scenes.shared.condim import has_condim, spins
 
 LICENCE = "Apache-2.0"
 EXACT = 1e-8  # largest difference of the velocities of a step that is exact, relative
@@ -198,7 +198,7 @@ def contacts_of(
     """
     found = [data.contact[k] for k in range(data.ncon)]
     active = [k for k, one in enumerate(found) if one.exclude == 0]
-    spin, rolling = spins(model), rolls(model)
+    spin, rolling = spins(model), has_condim(model, 6)
     # the rows of MuJoCo that are kept: N, T1, T2, then spin, R1, R2
     kept = [0, 1, 2, *([3] if spin else []), *([4, 5] if rolling else [])]
     others = np.setdiff1d(np.arange(6), kept)

@@ -1,8 +1,8 @@
 """The few operations on sparse matrices that a step needs, on their arrays.
 
 SciPy checks and copies at every operation. This takes tens of microseconds, more than the entries
-of a robot take. Sums are taken in SciPy's order, entry after entry, so that problems are the same
-to the last bit.
+of a robot take. What each step does is in the core (core/stepping). Sums are taken in SciPy's
+order, entry after entry, so that problems are the same to the last bit.
 """
 
 from __future__ import annotations
@@ -41,6 +41,12 @@ def by_columns(data: Vector, rows: Index, starts: Index, shape: tuple[int, int])
     return matrix
 
 
+def matrix_of(arrays: tuple[Any, ...], shape: tuple[int, int]) -> Sparse:
+    """A matrix by columns from the three arrays that the core returns."""
+    data, rows, starts = arrays
+    return by_columns(data, rows, starts, shape)
+
+
 def lengths_of(starts: Index) -> Index:
     """The lengths (k) of rows or columns with these pointers (k + 1)."""
     lengths: Index = starts[1:] - starts[:-1]  # np.diff takes four times as long
@@ -50,13 +56,6 @@ def lengths_of(starts: Index) -> Index:
 def columns_of(matrix: Sparse) -> npt.NDArray[np.intp]:
     """The column (nnz) of each entry."""
     return np.arange(len(matrix.indptr) - 1).repeat(lengths_of(matrix.indptr))
-
-
-def times(matrix: Sparse, x: Vector) -> Vector:
-    """A x."""
-    weights = matrix.data * x.repeat(lengths_of(matrix.indptr))
-    sums = np.bincount(matrix.indices, weights, matrix.shape[0])
-    return np.asarray(sums, dtype=float)  # without entries, NumPy's sums are integers
 
 
 def transposed_times(matrix: Sparse, x: Vector) -> Vector:
@@ -91,38 +90,3 @@ def without_zeros(data: Vector, rows: Index, starts: Index, shape: tuple[int, in
         return by_columns(data.copy(), rows.astype(np.int32), starts, shape)
     starts = kept.searchsorted(starts).astype(np.int32)
     return by_columns(data.take(kept), rows.take(kept).astype(np.int32, copy=False), starts, shape)
-
-
-def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
-    """A + factor B, without zeros."""
-    if not len(other.data):
-        return matrix
-    n = matrix.shape[0]
-    columns, others = columns_of(matrix), columns_of(other)
-    if len(others) <= n and (other.indices == others).all():
-        at = (matrix.indices == columns).nonzero()[0]
-        if len(at) == n:
-            # adds a diagonal to an existing one
-            sums = matrix.data.copy()
-            sums[at.take(others)] += factor * other.data
-            if sums.all():
-                return by_columns(sums, matrix.indices, matrix.indptr, matrix.shape)
-    places = np.concatenate((columns * n + matrix.indices, others * n + other.indices))
-    values = np.concatenate((matrix.data, factor * other.data))
-    return summed(values, places, matrix.shape)
-
-
-def summed(values: Vector, places: Index, shape: tuple[int, int]) -> Sparse:
-    """A matrix of entries at places column * rows + row, those of one place are added in order."""
-    unique, inverse = np.unique(places, return_inverse=True)
-    sums: Vector = np.asarray(
-        np.bincount(inverse.ravel(), values, minlength=len(unique)), dtype=float
-    )
-    starts = unique.searchsorted(shape[0] * np.arange(shape[1] + 1))
-    return without_zeros(sums, unique % shape[0], starts, shape)
-
-
-def diagonal(values: Vector) -> Sparse:
-    """A diagonal matrix, without zeros."""
-    n = len(values)
-    return without_zeros(values, np.arange(n), np.arange(n + 1), (n, n))

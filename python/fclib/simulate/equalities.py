@@ -13,17 +13,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from fclib import _core
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.arrays import (
-    Sparse,
-    Vector,
-    by_columns,
-    columns_of,
-    empty,
-    lengths_of,
-    submatrix,
-    without_zeros,
-)
+from fclib.simulate.arrays import Sparse, Vector, empty, matrix_of, without_zeros
 
 # workshop/tables/loop_rounding.py chose these, docs/results/loop-rounding.csv has its results
 RANK: Final = 1e-9  # rest of a row of length one, after the rows from which it follows
@@ -31,7 +23,6 @@ OWN: Final = 1e-3  # a row with a larger rest is independent
 ROUNDING: Final = 2.0  # a gap may be so many units in the last place of all terms added
 TURNED: Final = 8.0  # the rest of a row may be so many times the angle by which a loop is open
 SINGULAR: Final = 1e-6  # A^T A tells larger singular values from zero: its rounding is below 1e-13
-FEW: Final = 48  # up to so many columns, products are faster with a full matrix
 SEEN: Final = 1e-13  # solvers see that a row follows if its rest is below 1e-12 (eliminate.cpp)
 
 CONNECT, WELD, JOINT, TENDON = (
@@ -63,30 +54,30 @@ class Equalities:
                     body = m.body_parentid[body]
         # each turns all bodies after it
         self.turned = self.on_the_way * np.maximum(depth - 1, 0)
+        # an angle of a weld is multiplied by a length
+        self.turns = m.eq_data[:, 10] * (self.depth + 2)
+        self.reach = (self.depth + 2) * self.arms
+        self.ties = bool(self.depth.any())
+        self.sums = np.flatnonzero((m.eq_type == JOINT) | (m.eq_type == TENDON)).tolist()
 
-    def columns(self, d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
+    def columns(self, d: Any) -> tuple[Sparse, Vector]:
         """G (n x p) and the violation (p), without rows that vanish.
 
         A loop in a plane has a row normal to the plane, which says 0 = 0.
         """
+        n = self.model.nv
         if not d.ne:
-            return empty((rows.shape[0], 0)), np.zeros(0)
-        gradients = submatrix(rows, np.arange(d.ne))
-        kept = self.kept(d, gradients)
-        G = submatrix(gradients, kept)
-        return consistent(G, d.efc_pos[: d.ne][kept], self.rounding(d)[kept])
+            return empty((n, 0)), np.zeros(0)
+        rounding = self.rounding(d)
+        kept, columns = self.kept(d, rounding)
+        G = matrix_of(columns, (n, len(kept)))
+        return consistent(G, d.efc_pos[: d.ne][kept], rounding[kept])
 
-    def kept(self, d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
-        """Which rows are not zero beside others of their equality, by their gradients (n x ne)."""
-        sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-        group = 2 * d.efc_id[: d.ne] + self.of_turns(d)
-        largest = np.zeros(2 * self.model.neq)
-        np.maximum.at(largest, group, sizes)
-        vanish = (sizes <= RANK * largest[group]) | (
-            # an equality of bodies that cannot move
-            (sizes <= RANK * sizes.max(initial=0.0)) & (sizes <= self.rounding(d))
-        )
-        return np.flatnonzero(~vanish)
+    def kept(self, d: Any, rounding: Vector) -> tuple[npt.NDArray[np.int64], Any]:
+        """Which rows are not zero beside others of their equality, and the arrays of G."""
+        group = 2 * d.efc_id[: d.ne].astype(np.int64) + self.of_turns(d)
+        kept, columns = _core.bilateral_rows(d, self.model.nv, group, rounding, RANK)
+        return kept, columns
 
     def of_turns(self, d: Any) -> npt.NDArray[np.bool_]:
         """Which rows (ne) are angles of a weld: the last three of its six."""
@@ -97,22 +88,24 @@ class Equalities:
 
     def rounding(self, d: Any) -> Vector:
         """The largest rounding error of the violation of each row (ne) [m, rad]."""
-        m = self.model
-        lengths = np.linalg.norm(d.xpos, axis=1)
-        steps = np.linalg.norm(d.xpos - d.xpos[m.body_parentid], axis=1)
-        place = self.on_the_way @ lengths + self.turned @ steps + (self.depth + 2) * self.arms
-        # an angle of a weld is multiplied by a length
-        turn = m.eq_data[:, 10] * (self.depth + 2)
-        for i in np.flatnonzero((m.eq_type == JOINT) | (m.eq_type == TENDON)):
-            place[i] = terms(m, d, int(i))
+        m, place = self.model, self.reach
+        if self.ties:
+            lengths = np.linalg.norm(d.xpos, axis=1)
+            steps = np.linalg.norm(d.xpos - d.xpos[m.body_parentid], axis=1)
+            place = self.on_the_way @ lengths + self.turned @ steps + place
+        elif self.sums:
+            place = place.copy()
+        for i in self.sums:
+            place[i] = terms(m, d, i)
         number = d.efc_id[: d.ne]
-        sizes: Vector = np.where(self.of_turns(d), turn[number], place[number])
+        sizes: Vector = np.where(self.of_turns(d), self.turns[number], place[number])
         return ROUNDING * np.finfo(float).eps * sizes
 
-    def of_columns(self, d: Any, rows: Sparse) -> tuple[list[str], Vector]:
+    def of_columns(self, d: Any) -> tuple[list[str], Vector]:
         """The name of the equality of each column of G, and its largest rounding error."""
-        kept = self.kept(d, submatrix(rows, np.arange(d.ne)))
-        return [self.name(i) for i in d.efc_id[: d.ne][kept]], self.rounding(d)[kept]
+        rounding = self.rounding(d)
+        kept, _ = self.kept(d, rounding)
+        return [self.name(i) for i in d.efc_id[: d.ne][kept]], rounding[kept]
 
     def name(self, i: int) -> str:
         """The name of an equality: its own, or the names that it joins."""
@@ -145,17 +138,20 @@ def ends_of(m: Any, i: int) -> list[tuple[int, Vector]]:
 def terms(m: Any, d: Any, i: int) -> float:
     """The sum of the sizes of the terms in the violation of an equality of joints or tendons."""
     ends = [int(k) for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0]
+    added = 0.0
     if m.eq_type[i] == JOINT:
-        places = m.jnt_qposadr[ends]
-        now, before, added = d.qpos[places], m.qpos0[places], 0.0
+        places = [int(m.jnt_qposadr[k]) for k in ends]
+        sizes = [abs(float(d.qpos[k])) + abs(float(m.qpos0[k])) for k in places]
     else:
-        now, before = d.ten_length[ends], m.tendon_length0[ends]
+        sizes = [abs(float(d.ten_length[k])) + abs(float(m.tendon_length0[k])) for k in ends]
         # a tendon adds lengths between points of bodies
         points = float(np.sum(m.tendon_num[ends]))
         added = points * float(np.linalg.norm(d.site_xpos, axis=1).max(initial=0.0))
-    sizes = np.abs(now) + np.abs(before)
-    moved = np.polyval(np.abs(m.eq_data[i, 4::-1]), sizes[1] if len(ends) > 1 else 0.0)
-    return float(sizes[0] + moved) + added
+    # a polynomial of the second one
+    moved, x = 0.0, sizes[1] if len(ends) > 1 else 0.0
+    for factor in m.eq_data[i, 4::-1].tolist():
+        moved = moved * x + abs(factor)
+    return sizes[0] + moved + added
 
 
 def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, Vector]:
@@ -188,25 +184,8 @@ def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, 
 
 
 def are_independent(G: Sparse, violation: Vector, rounding: Vector) -> bool:
-    """Whether no column of G (n x p) follows from others; faster than `dependence`.
-
-    The rest of a column of length one, after others, is at least the smallest singular value of
-    all. That is above a bound if A^T A minus the bound's square on the diagonal has a Cholesky
-    factor.
-    """
-    n, p = G.shape
-    sizes = np.sqrt(np.bincount(columns_of(G), G.data * G.data, p))
-    if p > n or not sizes.all():
-        return False
-    bound = max(left_of_followers(sizes, violation, rounding).max(initial=0.0), SINGULAR)
-    scaled = by_columns(G.data / sizes.repeat(lengths_of(G.indptr)), G.indices, G.indptr, (n, p))
-    gram = dense_gram(scaled)
-    gram[np.arange(p), np.arange(p)] -= 2 * bound**2
-    try:
-        np.linalg.cholesky(gram)
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    """Whether no column of G (n x p) follows from others; faster than `dependence`."""
+    return _core.are_independent(G, G.shape[0], violation, rounding, RANK, OWN, TURNED, SINGULAR)
 
 
 def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vector:
@@ -218,16 +197,6 @@ def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vec
     blur = rounding / sizes + TURNED * opening(violation, sizes)
     bounds: Vector = np.clip(blur, RANK, OWN)
     return bounds
-
-
-def dense_gram(A: Sparse) -> Vector:
-    """A^T A (p x p); many columns are multiplied by their few entries."""
-    if A.shape[1] <= FEW:
-        columns = A.toarray()
-        few: Vector = columns.T @ columns
-        return few
-    many: Vector = (A.T @ A).toarray()
-    return many
 
 
 def gaps_of(

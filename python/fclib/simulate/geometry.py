@@ -19,6 +19,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from fclib import _core
 from fclib._geometry import KINDS, Bodies, Contacts
 from fclib.simulate import moreau_jean
 from fclib.simulate._mujoco import mujoco
@@ -155,15 +156,15 @@ def features(
 
 
 def on_shapes(model: MujocoModel, point: Vector, geom: npt.NDArray[np.int64]) -> Vector:
-    """Points (nc x 3) of contacts in the frames of their two shapes (nc x 2 x 3) [m]."""
+    """Points (nc x 3) of contacts in the frames of their two shapes (nc x 2 x 3) [m].
+
+    It is 0 if the first shape is negative, as that of a limit.
+    """
     d = model.data
-    arm = point[:, None] - d.geom_xpos.take(geom, axis=0)
-    if model.scene.period is not None:
-        edges = np.array(model.scene.period)
-        arm[..., :2] -= edges * np.rint(arm[..., :2] / edges)
-    turn = d.geom_xmat.take(geom, axis=0).reshape(-1, 2, 3, 3)
-    local: Vector = np.einsum("csji,csj->csi", turn, arm)
-    return local
+    places: Vector = _core.places_on_shapes(
+        point, geom, d.geom_xpos, d.geom_xmat, *(model.scene.period or (0.0, 0.0))
+    )
+    return places
 
 
 def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contacts) -> Vector:
@@ -171,13 +172,9 @@ def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contac
 
     It is 0 for limits, and for elastic bodies: there the nodes tell contacts apart.
     """
-    places = np.zeros((len(contacts), 2, 3))
     if isinstance(model, MujocoModel):
-        bodies = (contacts.pair[:, 0] >= 0).nonzero()[0]
-        if len(bodies):
-            points, geoms = contacts.point.take(bodies, axis=0), contacts.pair.take(bodies, axis=0)
-            places[bodies] = on_shapes(model, points, geoms)
-    return places
+        return on_shapes(model, contacts.point, contacts.pair)
+    return np.zeros((len(contacts), 2, 3))
 
 
 def repeated_in_order(rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

@@ -75,9 +75,9 @@ V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, Sprin
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -87,17 +87,7 @@ import scipy.sparse as sp
 from fclib import _core, _geometry, _laws, _solve
 from fclib.scenes import Law
 from fclib.scenes.shared.interaction import Interaction
-from fclib.simulate.arrays import (
-    Sparse,
-    Vector,
-    added,
-    by_columns,
-    columns_of,
-    lengths_of,
-    submatrix,
-    times,
-    transposed_times,
-)
+from fclib.simulate.arrays import Sparse, Vector, matrix_of, transposed_times
 
 __all__ = ["Sparse", "Vector"]
 
@@ -127,18 +117,30 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.gap)
 
-    def __getitem__(self, which: npt.NDArray[Any]) -> Contacts:
-        return Contacts(
-            self.pair.take(which, axis=0),
-            self.point.take(which, axis=0),
-            self.frame.take(which, axis=0),
-            self.gap.take(which),
-            self.mu.take(which),
-            None if self.mu_r is None else self.mu_r.take(which),
-            self.planar,
-            None if self.interaction is None else self.interaction.take(which),
-            None if self.mu_s is None else self.mu_s.take(which),
-        )
+    def __getitem__(self, which: npt.NDArray[np.int64]) -> Contacts:
+        return self.chosen(which)
+
+    def chosen(
+        self, which: npt.NDArray[np.int64] | None = None, others: Contacts | None = None
+    ) -> Contacts:
+        """Those of some numbers, or all, and others after them, which have no interactions."""
+        mine = (self.pair, self.point, self.frame, self.gap, self.mu, self.mu_r, self.mu_s)
+        theirs = None
+        if others is not None:
+            theirs = (
+                others.pair,
+                others.point,
+                others.frame,
+                others.gap,
+                others.mu,
+                others.mu_r,
+                others.mu_s,
+            )
+        pair, point, frame, gap, mu, mu_r, mu_s = _core.rows_of(mine, which, theirs)
+        interaction = None
+        if self.interaction is not None and others is None:
+            interaction = self.interaction if which is None else self.interaction[which]
+        return Contacts(pair, point, frame, gap, mu, mu_r, self.planar, interaction, mu_s)
 
     @property
     def dimension(self) -> int:
@@ -183,43 +185,11 @@ class DryFriction:
     mass: Vector  # (k) a of the auxiliary degrees of freedom, of the size of the joint's inertia
     pair: npt.NDArray[np.int64]  # (k x 2) < 0, as for a limit: the joint or tendon
 
-    # the part that each step adds to a problem: for each joint an auxiliary degree of freedom and a
-    # contact, with N the auxiliary velocity and T1 the joint's
-
-    @cached_property
+    @functools.cached_property
     def contacts(self) -> Contacts:
-        """The contacts (k)."""
+        """The contacts (k) that each step adds: N the auxiliary velocity, T1 the joint's."""
         k = len(self.bound)
         return Contacts(self.pair, np.zeros((k, 3)), np.zeros((k, 3, 3)), np.zeros(k), np.ones(k))
-
-    @cached_property
-    def first(self) -> npt.NDArray[np.intp]:
-        """A degree of freedom (k) on which each acts."""
-        first: npt.NDArray[np.intp] = self.gradient.indices[self.gradient.indptr[:-1]]
-        return first
-
-    @cached_property
-    def places(self) -> npt.NDArray[np.int32]:
-        """The auxiliary degrees of freedom (k)."""
-        n, k = self.gradient.shape
-        return np.arange(n, n + k, dtype=np.int32)
-
-    @cached_property
-    def ends(self) -> npt.NDArray[np.int32]:
-        """The number of entries up to the end of each column N and of each column T1 (k x 2)."""
-        lengths = lengths_of(self.gradient.indptr)
-        both = np.column_stack((np.ones_like(lengths), lengths))
-        return both.cumsum(dtype=np.int32).reshape(both.shape)
-
-    @cached_property
-    def rows(self) -> npt.NDArray[np.int32]:
-        """The rows of the entries in the columns N and T1 of each."""
-        return np.insert(self.gradient.indices, self.gradient.indptr[:-1], self.places)
-
-    @cached_property
-    def values(self) -> Vector:
-        """The entries in the columns N and T1 of each."""
-        return np.insert(self.gradient.data, self.gradient.indptr[:-1], 1.0)
 
 
 @dataclass(frozen=True)
@@ -322,19 +292,10 @@ class MoreauJean:
         h = self.h
         contacts, H = system.contacts, system.H
         d = contacts.dimension
+        active: npt.NDArray[Any] | None = None
+        w_n: Vector
         if self.law == "velocity":
-            before = transposed_times(H, v)[0::d]
-            middle = contacts.gap + 0.5 * h * before
-            closed = allowances(system, h, v) if self.allowance else np.zeros(len(middle))
-            active = closing(contacts.pair, middle, closed, self.activation)
-            if len(active) < len(contacts):
-                contacts = contacts[active]
-            if self.allowance:
-                outer = ends(contacts, closed[active])
-                if len(outer) < len(active):
-                    active, contacts = active[outer], contacts[outer]
-            if len(active) < len(middle):
-                H, before = submatrix(H, block_columns(active, d)), before[active]
+            active, before = self.touching(system, v)
             w_n = self.restitution * before
         else:
             middle = contacts.gap
@@ -343,98 +304,84 @@ class MoreauJean:
             undone: Vector | float = self.stabilization
             if contacts.interaction is not None:
                 active, undone = self.seen(contacts.interaction, middle)
-                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
                 middle = middle[active]
             share = np.where(middle > 0, 1.0, undone)
             w_n = share * middle / h
+        if active is not None and len(active) == len(contacts):
+            active = None
+        dry = None if system.dry is None else system.dry.contacts
+        if active is not None or dry is not None:
+            contacts = contacts.chosen(active, dry)
 
-        w = np.zeros(d * len(contacts))
-        w[0::d] = w_n
-        implicit = self.theta * h
-        M = added(system.M, implicit, system.C)
-        f = times(M, v) + h * system.force
-        if self.theta < 1:
-            f -= implicit * (h - implicit) * times(system.K, v)
-        M = added(M, implicit**2, system.K)
-        b = self.stabilization / h * system.violation
-        tree, G = system.tree, system.G
-        if system.dry is not None:
-            M, H, G, f, w, contacts, tree = with_dry_friction(
-                system.dry, h, M, H, G, f, w, contacts, tree
-            )
-
-        given = system.driven
-        if given is not None:
-            # their velocities are known: they go to the right sides, and leave the unknowns
-            moved = np.zeros(len(f))
-            moved[given.dof] = given.velocity
-            f, w, b = (
-                f - times(M, moved),
-                w + transposed_times(H, moved),
-                b + transposed_times(G, moved),
-            )
-            kept = np.setdiff1d(np.arange(len(f)), given.dof)
-            # contacts that move nothing else are none
-            new = np.full(len(f), -1, dtype=np.int32)
-            new[kept] = np.arange(len(kept), dtype=np.int32)
-            M, H, G = (rows_of(matrix, new) for matrix in (submatrix(M, kept), H, G))
-            f, tree = f[kept], tree[kept]
-            touching = np.flatnonzero(lengths_of(H.indptr).reshape(-1, d).any(axis=1))
-            if len(touching) < len(contacts):
-                columns = block_columns(touching, d)
-                contacts, H, w = contacts[touching], submatrix(H, columns), w[columns]
-        if self.all_bodies:
-            inside, rows = np.arange(len(f)), np.arange(len(b))
-        else:
-            inside, rows = linked(tree, M, H, G)
-        whole = len(inside) == len(f) and len(rows) == len(b)
-        # all auxiliary degrees of freedom have contacts
-        count = len(f) if given is not None else len(v)
-        apart = rows[:0] if whole else np.setdiff1d(np.arange(count), inside)
-        if not whole:
-            place = np.full(len(f), -1, dtype=np.int32)
-            place[inside] = np.arange(len(inside), dtype=np.int32)
-            all_M, all_G = M, G
-            # nothing couples the bodies inside the problem to those outside
-            M, G = submatrix(M, inside, place), submatrix(G, rows, place)
-            H = submatrix(H, np.arange(H.shape[1]), place)
-        fields: dict[str, Any] = {
-            "M": M,
-            "H": H,
-            "G": G if rows.size else None,
-            "f": f if whole else f[inside],
-            "w": w,
-            "mu": contacts.mu,
-            "b": b[rows] if rows.size else None,
-            "spacedim": d,
-            "info": info or _core.ProblemInfo(),
-        }
-        problem: _laws.Global
-        if contacts.mu_s is not None:
-            # sliding and spin share their limit; with rolling each has its own
-            coupled = int(contacts.mu_r is None)
-            problem = _core.GlobalSpinProblem(
-                **fields, mu_s=contacts.mu_s, mu_r=contacts.mu_r, coupled=coupled
-            )
-        elif contacts.mu_r is None:
-            problem = _core.GlobalProblem(**fields)
-        else:
-            problem = _core.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
-
-        number = np.arange(len(v)) if given is None else kept[kept < len(v)]
+        problem, dofs, touching, rest = _core.step_problem(
+            d,
+            h,
+            self.theta,
+            system.M,
+            system.C,
+            system.K,
+            H,
+            system.G,
+            system.force,
+            v,
+            self.stabilization / h * system.violation,
+            w_n,
+            active,
+            system.tree,
+            system.dry,
+            system.driven,
+            self.all_bodies,
+            contacts.mu,
+            contacts.mu_r,
+            contacts.mu_s,
+            info or _core.ProblemInfo(),
+        )
+        if touching is not None:
+            contacts = contacts[touching]
+        if dofs is None:
+            dofs = all_of(len(v))
 
         def free() -> Vector:
             velocity = np.zeros_like(v)
-            if given is not None:
-                velocity[given.dof] = given.velocity
-            if apart.size:
-                others = np.setdiff1d(np.arange(len(b)), rows)
-                velocity[number[apart]] = free_velocity(
-                    all_M[apart][:, apart], all_G[apart][:, others], f[apart], b[others]
+            if system.driven is not None:
+                velocity[system.driven.dof] = system.driven.velocity
+            if rest is not None:
+                M, G, f, b, others = rest
+                n = len(f)
+                velocity[others] = free_velocity(
+                    matrix_of(M, (n, n)), matrix_of(G, (n, len(b))), f, b
                 )
             return velocity
 
-        return StepProblem(problem, contacts, number[inside[inside < len(number)]], free)
+        return StepProblem(problem, contacts, dofs, free)
+
+    def touching(self, system: System, v: Vector) -> tuple[npt.NDArray[np.int64], Vector]:
+        """The active contacts by the velocity law, and their normal velocities before the step."""
+        contacts, surface = system.contacts, system.shape_rounding
+        active, before, crowded = _core.active_contacts(
+            system.H,
+            system.M,
+            v,
+            system.force,
+            contacts.pair,
+            contacts.point,
+            contacts.gap,
+            contacts.dimension,
+            self.h,
+            self.allowance,
+            ROUNDINGS * system.rounding,
+            MOTION,
+            None if surface is None else ROUNDINGS * surface,
+            self.activation,
+            FACE,
+        )
+        if crowded:
+            kept = np.ones(len(active), dtype=bool)
+            for own, off in crowded:
+                which = active[own]
+                kept[own] = outer(contacts.point[which], contacts.frame[which, 0], off)
+            active, before = active[kept], before[kept]
+        return active, before
 
     def seen(
         self, interaction: npt.NDArray[np.int64], middle: Vector
@@ -470,137 +417,15 @@ class StepProblem:
         return velocity
 
 
-def with_dry_friction(
-    dry: DryFriction,
-    h: float,
-    M: Sparse,
-    H: Sparse,
-    G: Sparse,
-    f: Vector,
-    w: Vector,
-    contacts: Contacts,
-    tree: npt.NDArray[np.int64],
-) -> tuple[Sparse, Sparse, Sparse, Vector, Vector, Contacts, npt.NDArray[np.int64]]:
-    """The problem's data with an auxiliary degree of freedom and a contact for each friction."""
-    n, d = len(f), contacts.dimension
-    k, own = len(dry.bound), dry.contacts
-    starts = np.empty((k, d), dtype=np.int32)
-    # N and T1; later columns have no entries
-    starts[:, :1], starts[:, 1:] = dry.ends[:, :1], dry.ends[:, 1:]
-    starts += H.indptr[-1]
-    return (
-        by_columns(
-            np.concatenate((M.data, dry.mass)),
-            np.concatenate((M.indices, dry.places)),
-            np.concatenate((M.indptr, dry.places + (M.indptr[-1] + 1 - n))),
-            (n + k, n + k),
-        ),
-        by_columns(
-            np.concatenate((H.data, dry.values)),
-            np.concatenate((H.indices, dry.rows)),
-            np.concatenate((H.indptr, starts.ravel())),
-            (n + k, H.shape[1] + d * k),
-        ),
-        by_columns(G.data, G.indices, G.indptr, (n + k, G.shape[1])),
-        np.concatenate((f, -h * dry.bound)),
-        np.concatenate((w, np.zeros(d * k))),
-        Contacts(
-            np.concatenate((contacts.pair, own.pair)),
-            np.concatenate((contacts.point, own.point)),
-            np.concatenate((contacts.frame, own.frame)),
-            np.concatenate((contacts.gap, own.gap)),
-            np.concatenate((contacts.mu, own.mu)),
-            None if contacts.mu_r is None else np.concatenate((contacts.mu_r, np.zeros(k))),
-            contacts.planar,
-            mu_s=None if contacts.mu_s is None else np.concatenate((contacts.mu_s, np.zeros(k))),
-        ),
-        np.concatenate((tree, tree.take(dry.first))),
-    )
+def outer(x: Vector, normal: Vector, off: Vector) -> npt.NDArray[np.bool_]:
+    """Which of many points (k x 3) of a pair are corners, within off (k) [m].
 
-
-def allowances(system: System, h: float, v: Vector) -> Vector:
-    """The gaps (nc) [m] that count as closed: what rounding and solvers may make of gaps of 0.
-
-    Coordinate i is assumed to be off by ROUNDINGS of a stored state, and by the share MOTION of its
-    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are also a share of that. A
-    surface is off by ROUNDINGS of its own.
+    In a pair with many points, inside of those in the same plane counts as between.
     """
-    M, H = system.M, system.H
-    own = M.indices == columns_of(M)
-    free = np.abs(v) + h * np.abs(system.force) / M.data[own]
-    off = ROUNDINGS * system.rounding + MOTION * h * free
-    sizes = by_columns(np.abs(H.data), H.indices, H.indptr, H.shape)
-    found = transposed_times(sizes, off)[0 :: system.contacts.dimension]
-    if system.shape_rounding is not None:
-        pair = system.contacts.pair
-        shapes = np.flatnonzero(pair[:, 0] >= 0)
-        found[shapes] += ROUNDINGS * system.shape_rounding[pair[shapes]].sum(axis=1)
-    return found
-
-
-def closing(
-    pair: npt.NDArray[np.int64], middle: Vector, closed: Vector, activation: float
-) -> npt.NDArray[np.intp]:
-    """Which contacts are active, by their gaps in the middle of the step (nc) [m].
-
-    A contact is active if its gap is `closed` (nc) or less. In a pair (nc x 2) with such a contact,
-    contacts are also active if they are open by at most the activation.
-    """
-    touches = middle <= closed
-    if activation > 0:
-        _, which = np.unique(pair, axis=0, return_inverse=True)
-        which = which.reshape(-1)
-        pairs = np.zeros(len(middle), dtype=bool)
-        pairs[which[touches]] = True
-        touches |= pairs[which] & (middle <= activation)
-    return np.flatnonzero(touches)
-
-
-def keys(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """A number for each pair (nc x 2), equal for equal pairs: faster to compare than rows."""
-    return (pair[:, 0] << 32) + pair[:, 1]
-
-
-def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
-    """Which contacts are not between others of their pair, within `off` (nc) [m].
-
-    Reactions at the others can replace a reaction between them. Between two contacts counts in any
-    pair. In a pair with many points, inside of those in the same plane counts too.
-    """
-    key = keys(contacts.pair)
-    order = key.argsort(kind="stable")
-    key = key.take(order)
-    starts = np.concatenate(([True], key[1:] != key[:-1], [True])).nonzero()[0]
-    counts = lengths_of(starts)
-    kept = np.ones(len(key), dtype=bool)
-    for count in set(counts[counts > 2].tolist()):
-        own = order[starts[:-1][counts == count][:, None] + np.arange(count)]
-        own = own[contacts.pair[own[:, 0], 0] >= 0]
-        if count <= FACE:
-            kept[own] = not_between(contacts.point[own], off[own])
-            continue
-        kept[own] = False
-        for one in own:
-            for part in corners(contacts.point[one], contacts.frame[one, 0], off[one].max()):
-                which = one[part]
-                kept[which] = not_between(contacts.point[which[None]], off[which[None]])[0]
-    return kept.nonzero()[0]
-
-
-def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:
-    """Which of k points (g x k x 3) are not on a line between two others, within off (g x k)."""
-    count = x.shape[1]
-    there = np.ones(off.shape, dtype=bool)
-    first, second = np.triu_indices(count, 1)
-    along = x[:, second] - x[:, first]
-    squares = np.maximum((along * along).sum(axis=2), np.finfo(float).tiny)
-    for i in range(count):
-        arm = x[:, i, None] - x[:, first]
-        share = np.clip((arm * along).sum(axis=2) / squares, 0, 1)
-        far = np.linalg.norm(arm - share[:, :, None] * along, axis=2)
-        others = there[:, first] & there[:, second] & (first != i) & (second != i)
-        there[:, i] = ~(others & (far <= off[:, i, None])).any(axis=1)
-    return there
+    kept = np.zeros(len(x), dtype=bool)
+    for which in corners(x, normal, off.max()):
+        kept[which] = _core.not_between(x[which], off[which])
+    return kept
 
 
 def corners(x: Vector, normal: Vector, off: float) -> list[npt.NDArray[np.intp]]:
@@ -625,55 +450,22 @@ def corners(x: Vector, normal: Vector, off: float) -> list[npt.NDArray[np.intp]]
     return found
 
 
-def linked(
-    tree: npt.NDArray[np.int64], M: Sparse, H: Sparse, G: Sparse
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """The degrees of freedom linked to a contact, and the bilateral rows among them.
-
-    Trees of bodies are kept whole, whatever part of them a contact moves. Without a contact,
-    everything is kept: such a problem says that nothing touches.
-    """
-    n, p, trees = H.shape[0], G.shape[1], tree.max(initial=-1) + 1
-    if not H.shape[1]:
-        return np.arange(n), np.arange(p)
-    # mark trees with contacts; inertia and bilateral rows pass the mark on
-    touched = np.zeros(trees, dtype=bool)
-    touched[tree[H.indices]] = True
-    if not p and touched.all():
-        return np.arange(n), np.arange(0)
-    first, second = tree[M.indices], tree[columns_of(M)]
-    between = np.flatnonzero(first != second)
-    first, second = first[between], second[between]
-    of_row, row = tree[G.indices], columns_of(G)
-    reached = np.zeros(p, dtype=bool)
-    while True:
-        before = touched.sum()
-        touched[first[touched[second]]] = True
-        touched[second[touched[first]]] = True
-        reached[row[touched[of_row]]] = True
-        touched[of_row[reached[row]]] = True
-        if touched.sum() == before:
-            return np.flatnonzero(touched[tree]), np.flatnonzero(reached)
-
-
 def free_velocity(M: Sparse, G: Sparse, f: Vector, b: Vector) -> Vector:
     """Solve M v = f + G lambda, G^T v + b = 0 for v (n)."""
     if not len(b):
-        v: Vector = sp.linalg.spsolve(sp.csc_array(M), f)
-        return np.atleast_1d(v)
+        return _core.solution_of(M, f)
     alone = _core.GlobalProblem(
         M=M, H=sp.csc_array((len(f), 0)), G=G, f=f, w=[], mu=[], b=b, spacedim=3
     )
     return np.asarray(_solve.solve(alone).solution.v)
 
 
-def rows_of(matrix: Sparse, new: npt.NDArray[np.int32]) -> Sparse:
-    """The rows of a matrix that have a new number (-1: they are left out)."""
-    entry = new.take(matrix.indices)
-    kept = entry >= 0
-    starts = np.concatenate(([0], np.cumsum(kept)))[matrix.indptr].astype(np.int32)
-    shape = (int((new >= 0).sum()), matrix.shape[1])
-    return by_columns(matrix.data[kept], entry[kept], starts, shape)
+@functools.lru_cache(maxsize=64)
+def all_of(count: int) -> npt.NDArray[np.int64]:
+    """The numbers from 0; not to be changed."""
+    numbers = np.arange(count)
+    numbers.flags.writeable = False
+    return numbers
 
 
 def block_columns(blocks: npt.NDArray[np.intp], d: int) -> npt.NDArray[np.intp]:

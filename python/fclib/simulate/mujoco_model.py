@@ -25,13 +25,16 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from fclib import _core
 from fclib.scenes import Scene
-from fclib.scenes.shared.condim import rolls, spins
+from fclib.scenes.shared.condim import has_condim, spins
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.arrays import (
     Sparse,
     Vector,
+    by_columns,
     lengths_of,
+    matrix_of,
     pointers,
     submatrix,
     without_zeros,
@@ -45,7 +48,6 @@ from fclib.simulate.moreau_jean import (
     DryFriction,
     System,
     block_columns,
-    components,
 )
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
@@ -61,7 +63,7 @@ from fclib.simulate.mujoco_scene import (
 )
 from fclib.simulate.plane import in_plane
 from fclib.simulate.rounding import exponent_of
-from fclib.simulate.servos import Held, Servos
+from fclib.simulate.servos import Servos
 from fclib.simulate.terrain import CrowdedPairError, complete
 
 REACH: Final = 1e10  # limits count at any distance [rad] or [m]
@@ -133,7 +135,8 @@ class MujocoModel:
         # nor does that of joints alone
         self._dry: DryFriction | None = None
         self._rubbing_tendons = bool(m.tendon_frictionloss.any())
-        self.rolling = rolls(m)
+        self._frictionless = has_condim(m, 1)
+        self.rolling = has_condim(m, 6)
         # nothing spins in the plane
         self.spin = spins(m) and not scene.planar and "torsion" not in scene.ignore
         # make every detected contact give rows
@@ -235,13 +238,14 @@ class MujocoModel:
             self._complete_terrain()
         if self.scene.allowance and self._flat:
             complete_faces(m, d)
-        frictionless_to_frictional(d)
+        if self._frictionless:
+            frictionless_to_frictional(d)
         mujoco.mj_makeConstraint(m, d)
         self._check_warnings()
 
-        rows = jacobian(m, d)
+        rows: Sparse | None = None
         if self._cell:
-            rows = sp.csc_array(rows + self._cell.rows(m, d).T)
+            rows = sp.csc_array(jacobian(m, d) + self._cell.rows(m, d).T)
         H, contacts = contact_columns(self, rows)
         if self.scene.planar:
             geometries = np.where(contacts.pair[:, :1] < 0, 0, contacts.pair)
@@ -256,19 +260,19 @@ class MujocoModel:
         if self._meetings:
             kept, contacts = self._meetings.taken(contacts)
             H = submatrix(H, block_columns(kept, contacts.dimension))
-        G, violation = self._ties.columns(d, rows)
+        G, violation = self._ties.columns(d)
         if self._gait:
             # at the end of the step, as its springs are
             d.ctrl[:] = self._gait.controls(d.time + h)
         M = self._pattern.fill(d.M)
-        force, held = self._force(h, M)
+        force, linear = self._force(h, M)
         driven = None
         if self._drives:
             force = force + self._drives.force(d.time, h, self.scene.theta)
             driven = self._drives.driven(d.time + h)
-        C, K = self._linear or self._servos.linear(d, held)
-        if self._dry is None or self._rubbing_tendons:
-            self._dry = dry_friction(m, d, rows)
+        C, K = linear or self._linear or self._servos.linear(d)
+        if d.nf and (self._dry is None or self._rubbing_tendons):
+            self._dry = dry_friction(m, d)
         if self.scene.gyroscopic:
             C = sp.csc_array(C + gyroscopic(m, d))
         return System(
@@ -292,7 +296,7 @@ class MujocoModel:
 
         The rounding is the largest rounding error of each violation.
         """
-        return self._ties.of_columns(self.data, jacobian(self.model, self.data))
+        return self._ties.of_columns(self.data)
 
     def control(self, values: Any) -> None:
         """Set the controls (nu); they stay until they are set again.
@@ -354,13 +358,9 @@ class MujocoModel:
     def _set_reach(self, h: float, shared_speed: bool) -> None:
         """Detect contacts as far as the geometries may move within h; their margins add up."""
         m, d = self.model, self.data
-        twist = d.cvel.take(self._body, axis=0)
-        omega = twist[:, :3]
-        # MuJoCo gives the linear velocity at the centre of mass of the whole tree
-        arm = d.geom_xpos - d.subtree_com.take(self._root, axis=0)
-        velocity = twist[:, 3:] + crossed(omega, arm)
-        speed = np.sqrt((velocity * velocity).sum(axis=1))
-        speed += np.sqrt((omega * omega).sum(axis=1)) * m.geom_rbound
+        speed = _core.speeds_of(
+            d.cvel, self._body, d.subtree_com, self._root, d.geom_xpos, m.geom_rbound
+        )
         if shared_speed:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
@@ -375,10 +375,10 @@ class MujocoModel:
             pair = np.column_stack((m.pair_geom1, m.pair_geom2))
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
 
-    def _force(self, h: float, M: Sparse) -> tuple[Vector, Held | None]:
+    def _force(self, h: float, M: Sparse) -> tuple[Vector, tuple[Sparse, Sparse] | None]:
         """F (n): passive, actuator and applied forces minus the bias c(q, v).
 
-        Also the servos that reach a limit within h.
+        Also damping and stiffness, if servos may reach a limit within h.
         """
         m, d = self.model, self.data
         if m.nu:
@@ -390,7 +390,7 @@ class MujocoModel:
             mujoco.mj_passive(m, d)
             mujoco.mj_rne(m, d, 0, d.qfrc_bias)
         force: Vector = d.qfrc_passive + d.qfrc_applied - d.qfrc_bias
-        held = None
+        linear = None
         if m.nu:
             mujoco.mj_fwdActuation(m, d)
         if m.nu and not self._servos.limited:
@@ -400,9 +400,9 @@ class MujocoModel:
                 push = d.xfrc_applied[body]
                 mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
         if self._servos.limited:
-            own, held = self._servos.within_limits(d, h, M, force)
+            own, linear = self._servos.within_limits(d, h, M, force)
             force += own
-        return force, held
+        return force, linear
 
     def _complete_terrain(self) -> None:
         try:
@@ -460,14 +460,6 @@ class Meetings:
         return kept, replace(contacts[kept], mu=self.mu[number], interaction=number)
 
 
-def crossed(a: Vector, b: Vector) -> Vector:
-    """The products a x b of rows (k x 3), as `np.cross` in a third of its time."""
-    second, third = (1, 2, 0), (2, 0, 1)
-    ahead = a.take(second, axis=1) * b.take(third, axis=1)
-    product: Vector = ahead - a.take(third, axis=1) * b.take(second, axis=1)
-    return product
-
-
 def advance_actuators(m: Any, d: Any, h: float) -> None:
     """The states of actuators after h [s], from MuJoCo's rates at their start."""
     kinds = mujoco.mjtDyn
@@ -483,10 +475,9 @@ def advance_actuators(m: Any, d: Any, h: float) -> None:
             d.act[k] = np.clip(d.act[k], *m.actuator_actrange[i])
 
 
-def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
-    """Dry friction of joints and tendons, from MuJoCo's rows as columns (n x nefc); None: none."""
-    if not d.nf:
-        return None
+def dry_friction(m: Any, d: Any) -> DryFriction:
+    """Dry friction of joints and tendons, from MuJoCo's rows."""
+    rows = jacobian(m, d)
     kind = d.efc_type[: d.ne + d.nf]
     of_joints = kind == FRICTION_DOF
     which = np.flatnonzero(of_joints | (kind == FRICTION_TENDON))
@@ -552,7 +543,10 @@ class MassPattern:
     def fill(self, values: Vector) -> Sparse:
         """M (n x n), by columns and without explicit zeros."""
         n = len(self.pointers) - 1
-        return without_zeros(values.take(self.entries), self.rows, self.pointers, (n, n))
+        entries = values.take(self.entries)
+        if entries.all():
+            return by_columns(entries, self.rows, self.pointers, (n, n))
+        return without_zeros(entries, self.rows, self.pointers, (n, n))
 
 
 def mass_pattern(m: Any) -> MassPattern:
@@ -576,66 +570,21 @@ def jacobian(m: Any, d: Any) -> Sparse:
     return without_zeros(d.efc_J[entries], d.efc_J_colind[entries], starts, shape)
 
 
-def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
+def contact_columns(source: MujocoModel, rows: Sparse | None) -> tuple[Sparse, Contacts]:
     """H (n x d nc) and the contacts that give rows: all except those between fixed bodies.
 
-    The limits of joints and tendons come after the contacts.
+    The limits of joints and tendons come after the contacts. `rows` (n x nefc) are MuJoCo's rows,
+    if others were added to them.
     """
-    data = source.data
-    contact = data.contact
-    address, geom = contact.efc_address, contact.geom
-    # a mocap body, or a body whose joints do not move the point, has rows without entries
-    starts = rows.indptr
-    moves = starts.take(address + 3, mode="clip") > starts.take(address, mode="clip")
-    given = (address >= 0) & moves
-    if source.model.nflex:
-        given &= geom.min(axis=1, initial=0) >= 0
-    which = given.nonzero()[0]
-    address = address.take(which)
-    dim = contact.dim.take(which)
-    friction = contact.friction.take(which, axis=0)
-    friction *= friction > LEAST_MU
-    # sliding has two coefficients, spin one, and rolling two
-    for one, other in ((0, 1), (3, 4)) if source.rolling else ((0, 1),):
-        differs = friction[:, one] != friction[:, other]
-        if differs.any():
-            both = friction[differs, one] * friction[differs, other]
-            friction[differs, one] = np.sqrt(both)
-
-    limits = slice(data.ne + data.nf, data.ne + data.nf + data.nl)
-    touching, nc = len(which), len(which) + data.nl
-    d = components(planar=False, rolling=source.rolling, spin=source.spin)
-    # -1 if a component has no row
-    source_row = np.full((nc, d), -1)
-    source_row[:touching, :3] = address[:, None] + np.arange(3)
-    # MuJoCo's rows are N, T1, T2, spin, R1, R2
-    if source.spin:
-        turning = np.flatnonzero(dim >= 4)
-        source_row[turning, 3] = address[turning] + 3
-    if source.rolling:
-        rolls = np.flatnonzero(dim == 6)
-        source_row[rolls, -2:] = address[rolls][:, None] + (4, 5)
-    source_row[touching:, 0] = np.arange(limits.start, limits.stop)
-    H = submatrix(rows, source_row.ravel())
-
-    def with_limits(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The values of all contacts; 0 for the limits."""
-        if nc == touching:
-            return values
-        found = np.zeros((nc, *values.shape[1:]), dtype=values.dtype)
-        found[:touching] = values
-        return found
-
-    contacts = Contacts(
-        pair=with_limits(geom.take(which, axis=0).astype(np.int64)),
-        point=with_limits(contact.pos.take(which, axis=0)),
-        frame=with_limits(contact.frame.take(which, axis=0).reshape(-1, 3, 3)),
-        gap=with_limits(contact.dist.take(which)),
-        mu=with_limits(friction[:, 0].copy()),
-        mu_r=with_limits(np.where(dim == 6, friction[:, 3], 0.0)) if source.rolling else None,
-        mu_s=with_limits(np.where(dim >= 4, friction[:, 2], 0.0)) if source.spin else None,
+    m, d = source.model, source.data
+    if rows is None:
+        lengths, columns, values = d.efc_J_rownnz, d.efc_J_colind, d.efc_J
+    else:
+        lengths = lengths_of(rows.indptr).astype(np.int32, copy=False)
+        columns, values = rows.indices.astype(np.int32, copy=False), rows.data
+    H, pair, point, frame, gap, mu, mu_r, mu_s = _core.contact_table(
+        d, d.contact, lengths, columns, values, m.nv, source.spin, source.rolling, LEAST_MU
     )
-    contacts.pair[touching:, 0] = -1 - data.efc_type[limits]
-    contacts.pair[touching:, 1] = data.efc_id[limits]
-    contacts.gap[touching:] = data.efc_pos[limits]
-    return H, contacts
+    contacts = Contacts(pair, point, frame, gap, mu, mu_r, mu_s=mu_s)
+    shape = (m.nv, contacts.dimension * len(contacts))
+    return matrix_of(H, shape), contacts

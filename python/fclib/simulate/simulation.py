@@ -10,13 +10,11 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
 from fclib import _core, _geometry, _laws, _solve
 from fclib._origin import origin_of
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
-from fclib.simulate.arrays import Sparse, submatrix
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.equalities import RANK, dependence, gaps_of
 from fclib.simulate.geometry import places_of
@@ -28,8 +26,6 @@ from fclib.simulate.moreau_jean import (
     StepProblem,
     System,
     Vector,
-    block_columns,
-    keys,
 )
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import refuse_unknown
@@ -46,9 +42,6 @@ LARGEST: Final = 2.0**53
 
 # bodies are at rest below this speed at contacts, relative to the largest without reactions
 STILL: Final = 1e-6
-# for reactions nearest to the last ones: the accuracy asked for, and the number of steps
-EXACT: Final = 1e-14
-MOST: Final = 1000
 
 Unsolved: TypeAlias = Literal["best", "stop"]
 
@@ -273,30 +266,8 @@ def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vecto
     Reactions of sticking contacts may change by any dr that moves nothing, H dr = 0. A solver
     returns any of these, so that the reactions of a body at rest would change from step to step.
     """
-    d = problem.spacedim
-    u = np.abs(np.asarray(solution.u)).reshape(-1, d)
-    M, H = problem.M, problem.H
-    # velocities without reactions, except for coupled degrees of freedom
-    free = np.abs(problem.f) / np.abs(M.diagonal())
-    closed = solution.r[::d] > 0
-    if not closed.any() or u[closed].max() > STILL * free.max():
-        return None
-    H = submatrix(H, block_columns(np.flatnonzero(closed), d))
-    if H.shape[1] <= np.count_nonzero(np.bincount(H.indices)):
-        return None  # they are unique: as many as the directions that they push
-    sticks = np.repeat(closed, d)
-    change = r[sticks] - solution.r[sticks]
-    found: Vector = np.array(solution.r)
-    found[sticks] += change - moving_part(H, change)
+    found: Vector | None = _core.nearest_at_rest(problem, solution, r, STILL)
     return found
-
-
-def moving_part(H: Sparse, change: Vector) -> Vector:
-    """The part of a change of reactions (m) that moves bodies: the least x with H x = H change."""
-    # SciPy's own operator of a matrix transposes it again at each product
-    products = sp.linalg.LinearOperator(H.shape, matvec=H.dot, rmatvec=H.T.dot, dtype=float)
-    found = sp.linalg.lsmr(products, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
-    return np.asarray(found)
 
 
 def in_range(values: Vector, bound: float) -> bool:
@@ -370,9 +341,17 @@ def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:
 
     places   (nc x 2 x 3) of the contacts on their shapes, from `places_of`
     """
-    limits = contacts.pair[:, 0] < 0
-    source = same_contacts(state.pair, state.place, contacts.pair, places)
-    return _geometry.turned(state.r, source, state.frame, contacts.frame, contacts.parts, limits)
+    source = same_contacts(np.asarray(state.pair, np.int64), state.place, contacts.pair, places)
+    d, planar = contacts.dimension, contacts.planar
+    carried: Vector = _core.carried_over(
+        state.r,
+        source,
+        state.frame,
+        contacts.frame,
+        2 if planar else 3,
+        _geometry.first_axis(planar, d),
+    )
+    return carried
 
 
 def same_contacts(
@@ -380,33 +359,13 @@ def same_contacts(
     old_places: Vector,
     now: npt.NDArray[np.int64],
     places: Vector,
-) -> npt.NDArray[np.intp]:
+) -> npt.NDArray[np.int64]:
     """The contact of the step before that each one continues (nc); -1 for none.
 
     If a pair of shapes has several, the nearest to each other are matched first. An edge or a
     corner keeps its place on one of the shapes, so the smaller of two distances counts.
     """
-    source = np.full(len(now), -1)
-    old, new = keys(before), keys(now)
-    order = old.argsort(kind="stable")
-    old = old.take(order)
-    first = old.searchsorted(new)
-    # every old contact of its pair beside each new one
-    repeats = old.searchsorted(new, "right") - first
-    later = np.arange(len(now)).repeat(repeats)
-    number = np.arange(len(later)) - (repeats.cumsum() - repeats).repeat(repeats)
-    earlier = order[first[later] + number]
-    alone = (repeats == 1) & (np.bincount(first, repeats > 0)[first] == 1)
-    alone = alone[later]
-    source[later[alone]] = earlier[alone]
-    if alone.all():
-        return source
-    later, earlier = later[~alone], earlier[~alone]
-    far = np.linalg.norm(places[later] - old_places[earlier], axis=2).min(axis=1)
-    taken = np.zeros(len(before), dtype=bool)
-    for k in np.argsort(far, kind="stable").tolist():
-        if source[later[k]] < 0 and not taken[earlier[k]]:
-            source[later[k]], taken[earlier[k]] = earlier[k], True
+    source: npt.NDArray[np.int64] = _core.same_contacts(before, old_places, now, places)
     return source
 
 

@@ -12,9 +12,9 @@ def spins(m: Any) -> bool:
     return bool(of_shapes.any() or of_pairs.any())
 
 
-def rolls(m: Any) -> bool:
-    """Whether a contact of the model may resist rolling (condim 6)."""
-    return bool(6 in m.geom_condim[collides(m)] or 6 in m.pair_dim)
+def has_condim(m: Any, condim: int) -> bool:
+    """Whether a contact of the model may have so many components; with 6 it resists rolling."""
+    return bool(condim in m.geom_condim[collides(m)] or condim in m.pair_dim)
 
 
 def collides(m: Any) -> Any:

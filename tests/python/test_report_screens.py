@@ -17,7 +17,7 @@ from fclib.bench import Job, Limits, Record, SolverChoice, Store
 from fclib.bench.profiles import caption as caption_of
 from fclib.collections.figures import bins_of, is_whole
 from fclib.report import Campaigns, build_site, view_of, write_view
-from helpers_browser import chromium
+from helpers_browser import chromium, colours
 from helpers_report import (
     made_facts,
     make_collection,
@@ -128,7 +128,7 @@ def test_the_first_screen_has_what_one_came_for(
     shot = page.screenshot(path=screens / f"{name.replace(' ', '-')}-{size}.png")
     image = pytest.importorskip("PIL.Image")
     seen = np.asarray(image.open(io.BytesIO(shot)).convert("RGB"))
-    assert len(np.unique(seen.reshape(-1, 3), axis=0)) > 30  # no empty page
+    assert colours(seen) > 30  # no empty page
     page.close()
 
 

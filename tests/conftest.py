@@ -28,15 +28,17 @@ hypothesis.settings.load_profile("fclib")
 
 # files by the time that they take, of those that take long
 LONGEST = (
+    "test_report_screens",
     "test_report_browser",
-    "test_capi",
-    "test_collection",
     "test_trajectory",
+    "test_capi",
+    "test_bench_cluster",
+    "test_bench_limits",
+    "test_collection",
     "test_docs_code",
     "test_docs",
     "test_tutorials",
     "test_report_compute",
-    "test_bench_limits",
     "test_auto",
     "test_machines",
     "test_bench",

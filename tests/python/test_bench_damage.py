@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import sqlite3
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -214,3 +216,50 @@ def test_a_store_that_only_claims_to_be_old(whole: Path, tmp_path: Path) -> None
     database.close()
     with pytest.raises(DamagedError, match="35 of its runs can be read"):
         bench.Store(path)
+
+
+def writes_between(
+    store: bench.Store, other: bench.Store, name: str, monkeypatch: pytest.MonkeyPatch
+) -> list[str]:
+    """After each read of a store by `name`, another process stores a run of a new problem."""
+    jobs = iter(campaign(name="late", tolerances=[1e-5]).plan())
+    read, keys = getattr(store, name), []
+
+    def then_write(*values: Any) -> Any:
+        found = read(*values)
+        found = found if isinstance(found, dict) else iter(list(found))
+        if (job := next(jobs, None)) is not None:
+            late = replace(job, problem=replace(job.problem, name="late", hash=job.key))
+            other.add(late, Record("converged"))
+            keys.append(late.key)
+        return found
+
+    monkeypatch.setattr(store, name, then_write)
+    return keys
+
+
+def test_a_reader_beside_a_writer_finds_no_damage(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "shared.sqlite"
+    shutil.copy(whole, path)
+    with bench.Store(path) as store, bench.Store(path) as other, warnings.catch_warnings():
+        warnings.simplefilter("error", DamageWarning)
+        before = len(store.table())
+        keys = writes_between(store, other, "_by_number", monkeypatch)
+        assert len(store.table()) == before
+        assert keys
+        store.faults()
+
+
+def test_mending_beside_a_writer_removes_no_run(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "shared.sqlite"
+    shutil.copy(whole, path)
+    with bench.Store(path) as store, bench.Store(path) as other, warnings.catch_warnings():
+        warnings.simplefilter("error", DamageWarning)
+        keys = writes_between(store, other, "_right", monkeypatch)
+        assert store.mend() == 0
+        assert len(keys) > 3
+        assert set(keys) <= other.keys()

@@ -494,6 +494,19 @@ class Store:
                 self.db.execute("ROLLBACK")
             raise
 
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """What is read inside is of one moment, also if a campaign writes meanwhile."""
+        if self.db.in_transaction:
+            yield
+            return
+        self.db.execute("BEGIN")
+        try:
+            yield
+        finally:
+            if self.db.in_transaction:
+                self.db.execute("ROLLBACK")
+
     def _id(self, table: str, names: Sequence[str], values: Sequence[Any]) -> int:
         """The number of the row with a hash in its first column; it is made if needed."""
         if table not in self._ids:
@@ -544,6 +557,27 @@ class Store:
 
         A warning names the rows. The campaign that goes on runs them again.
         """
+        with self.snapshot():
+            if not self._damaged():
+                return 0
+        with self.transaction(), warnings.catch_warnings():
+            # once more, since a campaign may have stored runs meanwhile
+            warnings.simplefilter("ignore", DamageWarning)
+            gone = self._damaged()
+            # indexes hold the values that rows had before the damage
+            self.db.execute("REINDEX")
+            for table, places in gone.items():
+                rows = [(place,) for place in places]
+                self.db.executemany(f"DELETE FROM {table} WHERE rowid = ?", rows)
+        self._ids.clear()
+        runs = gone.get("runs", [])
+        if runs:
+            what = "damaged, or of damaged rows, and removed: a campaign runs them again"
+            self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
+        return len(runs)
+
+    def _damaged(self) -> dict[str, list[int]]:
+        """The damaged rows of each table, and those that refer to them."""
         gone: dict[str, list[int]] = {}
         kept: dict[str, set[int]] = {}
         for table, own in layouts().items():
@@ -558,20 +592,7 @@ class Store:
             if count != len(kept[table]):
                 every = self.db.execute(f"SELECT rowid FROM {table} NOT INDEXED").fetchall()
                 gone[table] = [row for (row,) in every if row not in kept[table]]
-        if not gone:
-            return 0
-        with self.transaction():
-            # indexes hold the values that rows had before the damage
-            self.db.execute("REINDEX")
-            for table, places in gone.items():
-                rows = [(place,) for place in places]
-                self.db.executemany(f"DELETE FROM {table} WHERE rowid = ?", rows)
-        self._ids.clear()
-        runs = gone.get("runs", [])
-        if runs:
-            what = "damaged, or of damaged rows, and removed: a campaign runs them again"
-            self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
-        return len(runs)
+        return gone
 
     def mended(self) -> Table:
         """All runs with their keys, after the damaged rows are removed."""
@@ -651,6 +672,10 @@ class Store:
 
     def faults(self) -> list[dict[str, Any]]:
         """The runs that a cause from outside prevented, and that have not been done since."""
+        with self.snapshot():
+            return self._faults()
+
+    def _faults(self) -> list[dict[str, Any]]:
         last: dict[str, dict[str, Any]] = {}
         for row in self._read("faults"):
             if row["key"] not in last or (row["started"] or 0) > (last[row["key"]]["started"] or 0):
@@ -813,6 +838,10 @@ class Store:
         Args:
             more: the columns of `MORE` to read too.
         """
+        with self.snapshot():
+            return self._table(more)
+
+    def _table(self, more: Sequence[str]) -> Table:
         own = layouts()["runs"]
         known = {column: list(self._by_number(column).values()) for column in REFERRED}
         wanted = [name for name in (*layout.columns(), "path") if name not in MORE or name in more]
@@ -971,7 +1000,7 @@ class Store:
                 other = Store(path, create=False)
             except DamagedError:
                 other = Store.recover(path)
-            with other, self.transaction():
+            with other, other.snapshot(), self.transaction():
                 added += self._take(other)
         return added
 

@@ -504,8 +504,7 @@ class Store:
         try:
             yield
         finally:
-            if self.db.in_transaction:
-                self.db.execute("ROLLBACK")
+            self.db.rollback()  # nothing was written, and a fault may have ended it
 
     def _id(self, table: str, names: Sequence[str], values: Sequence[Any]) -> int:
         """The number of the row with a hash in its first column; it is made if needed."""

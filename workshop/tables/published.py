@@ -227,14 +227,15 @@ def part_row(name: str, parts: Sequence[results.Shard]) -> Row:
     days = sorted(
         time.strftime("%Y-%m-%d", time.gmtime(row["started"])) for row in rows if row["started"]
     )
-    planned = max((int(c["planned"] or 0) for p in parts for c in p.campaigns), default=0)
+    begun = [c for part in parts for c in part.campaigns]
+    last = max(begun, key=lambda c: c["started"] or 0, default={"planned": 0})
     spent = math.fsum(row["total_cpu_s"] or 0.0 for row in rows if row["measured"] != "history")
     machines = {node: facts for part in parts for node, facts in part.machines.items()}
     known = [calibration_in(facts) for facts in machines.values()]
     return {
         "set": name,
         "runs": len(rows),
-        "planned": planned,
+        "planned": int(last["planned"] or 0),
         "read off histories": sum(row["measured"] == "history" for row in rows),
         "problems": len({row["hash"] for row in rows}),
         "solvers": len({row["solver"] for row in rows}),

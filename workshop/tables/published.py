@@ -149,10 +149,10 @@ def of_sets(
     """The parts of the page on sets."""
     yield from ("## What was run?", "")
     yield from prose(
-        "`planned` are the runs of the whole campaign. Less was run where `runs` is smaller: "
-        "the order of a campaign makes any part of it balanced over the families. `load` is "
-        "the load of the machine as a run began; above the number of cores, times are longer "
-        "than on a quiet machine."
+        "`planned` are the runs of the whole campaign, as it was last begun. `runs` is less if a "
+        "solver failed, since its copy is then not run, or if the campaign was cut: its order "
+        "makes any part of it balanced over the families. `load` is the load of the machine as "
+        "a run began; above the number of cores, times are longer than on a quiet machine."
     )
     yield from table("published-parts", [part_row(n, own) for n, own in groups.items()],
                      "Published runs", "")  # fmt: skip

@@ -221,7 +221,7 @@ def contacts_of(
         force = np.zeros(6)
         mj.mj_contactForce(model, data, k, force)
         r.append(h * force[kept])
-        # the least friction of MuJoCo where a coefficient is 0
+        # MuJoCo has a least friction if a coefficient is 0
         twist += h * own[others].T @ force[others]
         # sliding has two coefficients, spin one, and rolling two
         known = one.dim - 1

@@ -155,16 +155,26 @@ def test_what_goes_by_name(by_name: Path, tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     text = fclib.read_siconos(tmp_path / "ball.dat")
     assert isinstance(text, fclib.LocalProblem)
-    (tmp_path / "valgrind").mkdir()
-    valgrind(by_name, tmp_path / "valgrind")
 
 
-def test_what_the_cpp_header_promises(programs: Path, tmp_path: Path) -> None:
-    program = compile_program(CAPI / "facade.cpp", programs / "facade", "-pedantic")
-    done = subprocess.run([program, tmp_path], capture_output=True, text=True, timeout=300)
+@pytest.mark.long
+def test_what_goes_by_name_is_clean_under_valgrind(by_name: Path, tmp_path: Path) -> None:
+    valgrind(by_name, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def facade(programs: Path) -> Path:
+    return compile_program(CAPI / "facade.cpp", programs / "facade", "-pedantic")
+
+
+def test_what_the_cpp_header_promises(facade: Path, tmp_path: Path) -> None:
+    done = subprocess.run([facade, tmp_path], capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    (tmp_path / "valgrind").mkdir()
-    valgrind(program, tmp_path / "valgrind")
+
+
+@pytest.mark.long
+def test_the_cpp_header_is_clean_under_valgrind(facade: Path, tmp_path: Path) -> None:
+    valgrind(facade, tmp_path)
 
 
 # ---- the examples
@@ -206,12 +216,6 @@ def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
     assert "no_such_solver" in done.stderr
 
 
-@pytest.mark.slow
-def test_the_examples_are_clean_under_valgrind(examples: dict[str, Path], tmp_path: Path) -> None:
-    valgrind(examples["write"], tmp_path / "ball.hdf5")
-    valgrind(examples["solve"], tmp_path / "ball.hdf5")
-
-
 @pytest.fixture(scope="session")
 def cpp_example(programs: Path) -> Path:
     return compile_program(ROOT / "examples/cpp/ball.cpp", programs / "ball-cpp")
@@ -240,18 +244,21 @@ def check_ball(program: Path, folder: Path) -> None:
     done = subprocess.run([program], capture_output=True, text=True)
     assert done.returncode == 2
     assert "usage" in done.stderr
-    valgrind(program, path)
 
 
 def test_the_example_in_cpp_runs(cpp_example: Path, tmp_path: Path) -> None:
     check_ball(cpp_example, tmp_path)
 
 
-def test_the_bodies_of_the_example_are_drawn(programs: Path, tmp_path: Path) -> None:
-    program = compile_program(ROOT / "examples/cpp/stack.cpp", programs / "stack-cpp")
+@pytest.fixture(scope="session")
+def stack_example(programs: Path) -> Path:
+    return compile_program(ROOT / "examples/cpp/stack.cpp", programs / "stack-cpp")
+
+
+def test_the_bodies_of_the_example_are_drawn(stack_example: Path, tmp_path: Path) -> None:
     path = tmp_path / "stack.hdf5"
     for _ in range(2):  # the file may be there already
-        done = subprocess.run([program, path], capture_output=True, text=True)
+        done = subprocess.run([stack_example, path], capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.startswith("converged")
     problem, solution = fclib.read(path), fclib.read_solution(path)
@@ -272,7 +279,17 @@ def test_the_bodies_of_the_example_are_drawn(programs: Path, tmp_path: Path) -> 
         assert shown.exit_code == 0, shown.output
         assert ('"ball"' in page.read_text()) == (name == "view")
         fclib.write(path, problem.replace(contacts=None, bodies=None), mode="replace")
-    valgrind(program, path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["examples", "cpp_example", "stack_example", "fortran_example"])
+def test_the_examples_are_clean_under_valgrind(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    made: Any = request.getfixturevalue(name)
+    programs = [made["write"], made["solve"]] if name == "examples" else [made]
+    for program in programs:
+        valgrind(program, tmp_path / "ball.hdf5")
 
 
 def test_the_example_in_fortran_runs(fortran_example: Path, tmp_path: Path) -> None:
@@ -301,12 +318,19 @@ def test_the_example_in_python_runs(tmp_path: Path) -> None:
 # ---- the Fortran module
 
 
-def test_what_the_fortran_module_promises(programs: Path, tmp_path: Path) -> None:
-    program = compile_fortran(CAPI / "fortran.f90", programs / "fortran")
-    done = subprocess.run([program, tmp_path], capture_output=True, text=True, timeout=300)
+@pytest.fixture(scope="session")
+def fortran(programs: Path) -> Path:
+    return compile_fortran(CAPI / "fortran.f90", programs / "fortran")
+
+
+def test_what_the_fortran_module_promises(fortran: Path, tmp_path: Path) -> None:
+    done = subprocess.run([fortran, tmp_path], capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    (tmp_path / "valgrind").mkdir()
-    valgrind(program, tmp_path / "valgrind")
+
+
+@pytest.mark.long
+def test_the_fortran_module_is_clean_under_valgrind(fortran: Path, tmp_path: Path) -> None:
+    valgrind(fortran, tmp_path)
 
 
 def without_comments(header: str) -> str:

@@ -1,6 +1,6 @@
-// The global problem with spin friction: that of global.hpp, with contacts that resist the turning
-// about their normal. A contact has the components N, T1, T2, S (spacedim 4), or N, T1, T2, S, R1,
-// R2 (6) if it resists rolling too:
+// Spin friction: the local and the global problem with contacts that resist the turning about their
+// normal. A contact has the components N, T1, T2, S (spacedim 4), or N, T1, T2, S, R1, R2 (6) if it
+// resists rolling too:
 //
 //   K = { ||r_T|| <= mu r_N, |r_S| <= mu_s r_N, ||r_R|| <= mu_r r_N }
 //   u^_N = u_N + mu ||u_T|| + mu_s |u_S| + mu_r ||u_R||
@@ -17,14 +17,13 @@
 #pragma once
 
 #include "problems/global.hpp"
+#include "problems/local.hpp"
 
 namespace fclib {
 
-struct GlobalSpinProblem : GlobalProblem {
-  static constexpr std::string_view kind = "global_spin";  // the group /fclib_global_spin
-  static constexpr const char* doc =
-      "The global problem with spin friction: M v = H r + f (+ G lambda), u = H^T v + w.";
-  static constexpr std::string_view prefix = "GS";  // of the formulation's name
+/// Form is LocalProblem or GlobalProblem, Self what is made of it.
+template <class Form, class Self>
+struct WithSpin : Form {
   static constexpr bool spin = true;
   static constexpr std::array<Index, 2> dimensions{4, 6};
 
@@ -32,10 +31,10 @@ struct GlobalSpinProblem : GlobalProblem {
   Vector mu_r;
   Index coupled = 0;
 
+  template <class P = Self>
   static constexpr auto fields() {
-    using P = GlobalSpinProblem;
     return std::tuple_cat(
-        GlobalProblem::fields<P>(),
+        Form::template fields<P>(),
         std::tuple{Field<P, Vector>{.name = "mu_s",
                                     .member = &P::mu_s,
                                     .rows = Dim::nc,
@@ -57,9 +56,23 @@ struct GlobalSpinProblem : GlobalProblem {
   }
 
   [[nodiscard]] Index size(Dim dim) const {
-    if (dim == Dim::nr) return spacedim == 6 ? GlobalProblem::size(Dim::nc) : 0;
-    return GlobalProblem::size(dim);
+    if (dim == Dim::nr) return this->spacedim == 6 ? Form::size(Dim::nc) : 0;
+    return Form::size(dim);
   }
+};
+
+struct LocalSpinProblem : WithSpin<LocalProblem, LocalSpinProblem> {
+  static constexpr std::string_view kind = "local_spin";  // the group /fclib_local_spin
+  static constexpr const char* doc =
+      "The local problem with spin friction: u = W r + q (+ V lambda).";
+  static constexpr std::string_view prefix = "S";  // of the formulation's name
+};
+
+struct GlobalSpinProblem : WithSpin<GlobalProblem, GlobalSpinProblem> {
+  static constexpr std::string_view kind = "global_spin";  // the group /fclib_global_spin
+  static constexpr const char* doc =
+      "The global problem with spin friction: M v = H r + f (+ G lambda), u = H^T v + w.";
+  static constexpr std::string_view prefix = "GS";  // of the formulation's name
 };
 
 }  // namespace fclib

@@ -10,7 +10,11 @@
 namespace fclib {
 
 Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadline)
-    : problem_(problem), mass_(to_eigen(problem.M), "M") {
+    : Condensation(problem, Factorization(to_eigen(problem.M), "M"), deadline) {}
+
+Condensation::Condensation(const GlobalProblem& problem, Factorization mass,
+                           const Deadline* deadline)
+    : problem_(problem), mass_(std::move(mass)) {
   const Deadline never(std::numeric_limits<double>::infinity());
   if (deadline == nullptr) deadline = &never;
   if (deadline->passed()) return;
@@ -51,14 +55,18 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
 }
 
 Solution Condensation::expand(const Solution& local) const {
+  return expanded(problem_, mass_, local);
+}
+
+Solution expanded(const GlobalProblem& problem, const Factorization& mass, const Solution& local) {
   Solution result = local;
   // joints and contacts may add far more to the velocity of a light body than what is left of it
-  RealVector momentum = problem_.f.cast<Real>();
-  multiply_add(problem_.H, local.r, momentum);
-  if (is_mixed(problem_)) multiply_add(problem_.G, local.l, momentum);
-  result.v = mass_.solve(Vector(momentum.cast<double>()));
-  result.u = problem_.w;
-  multiply_transposed_add(problem_.H, result.v, result.u);
+  RealVector momentum = problem.f.cast<Real>();
+  multiply_add(problem.H, local.r, momentum);
+  if (is_mixed(problem)) multiply_add(problem.G, local.l, momentum);
+  result.v = mass.solve(Vector(momentum.cast<double>()));
+  result.u = problem.w;
+  multiply_transposed_add(problem.H, result.v, result.u);
   return result;
 }
 

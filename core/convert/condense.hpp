@@ -17,12 +17,15 @@ class Condensation {
   /// If the deadline has passed after the factorisation of M, nothing more is done: finished() is
   /// false, and local() is not a problem then.
   explicit Condensation(const GlobalProblem& problem, const Deadline* deadline = nullptr);
+  /// ... with M factorised already.
+  Condensation(const GlobalProblem& problem, Factorization mass,
+               const Deadline* deadline = nullptr);
 
   [[nodiscard]] bool finished() const { return finished_; }
 
   [[nodiscard]] const LocalProblem& local() const { return local_; }
   [[nodiscard]] const Factorization& mass() const { return mass_; }
-  /// Completes v = M^-1 (H r + G lambda + f) and u = H^T v + w from r and l.
+  /// `expanded` with the factorisation that is kept.
   [[nodiscard]] Solution expand(const Solution& local) const;
 
  private:
@@ -31,6 +34,9 @@ class Condensation {
   LocalProblem local_;
   bool finished_ = false;
 };
+
+/// Completes v = M^-1 (H r + G lambda + f) and u = H^T v + w from r and l.
+Solution expanded(const GlobalProblem& problem, const Factorization& mass, const Solution& local);
 
 /// The local form of a global problem (M3DFC from GM3DFC). If its joints contradict each other only
 /// by rounding, they are made to agree (joints/consistent.hpp).

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "contact/laws.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "joints/consistent.hpp"
@@ -415,15 +416,63 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
       elimination, request.settings.tolerance);
 }
 
+/// A guess is judged if its natural map in plain arithmetic is at most so many tolerances.
+constexpr double promising = 2;
+
+/// ||r - P_K(r - u^)||^2 in plain arithmetic.
+double natural_squares(Index d, const Friction& friction, const Vector& u, const Vector& r) {
+  double sum = 0;
+  with_cone<double>(static_cast<int>(d), friction, [&]<class Cone>() {
+    for (Eigen::Index a = 0; a < friction.mu.size(); ++a) {
+      const ContactVector<Cone::dim, double> ua = u.segment<Cone::dim>(Cone::dim * a);
+      const ContactVector<Cone::dim, double> ra = r.segment<Cone::dim>(Cone::dim * a);
+      sum += natural_map(Cone(friction, a), ua, ra).squaredNorm();
+    }
+  });
+  return sum;
+}
+
+/// The guess, if it is the solution: as bodies at rest have it from the step before. It is judged
+/// without W, which takes longer than the judgement. Nothing if something is to be told of the way.
+template <class P>
+std::optional<Result> known_solution(const P& problem, const Friction& friction,
+                                     const Factorization& mass, const Request& request,
+                                     const Solution& guess) {
+  const Settings& settings = request.settings;
+  if (guess.r.size() == 0 || is_mixed(problem) || settings.history || settings.callback) return {};
+  const Index d = problem.spacedim;
+  Result result;
+  result.solver = request.solver.name;
+  Solution& solution = result.solution;
+  solution.r = guess.r;
+  clear_without_effect(moving(problem.H, d), d, solution.r);
+  solution = expanded(problem, mass, solution);
+  Vector q = problem.w;
+  multiply_transposed_add(problem.H, mass.solve(problem.f), q);
+  const double error = std::sqrt(natural_squares(d, friction, solution.u, solution.r));
+  if (!(error <= promising * settings.tolerance * q.stableNorm())) return {};
+  const OwnSizes own = own_sizes(problem, mass);
+  // if only rounding is left of q, the solution is r = 0
+  if (!(q.stableNorm() > static_cast<double>(own.rounding.norm()))) return {};
+  result.error = judge_and_complete(problem, friction, mass, own, settings.merit, solution);
+  if (!(result.error <= settings.tolerance)) return {};
+  result.status = Status::converged;
+  return result;
+}
+
 /// `given` is the problem as given; proofs are about it.
 template <class P>
 Result solve_global(const P& problem, const P& given, const Request& request,
                     const Solution& guess) {
   const auto prove = [&](const Vector& y) { return prove_no_solution(given, y); };
-  const Condensation condensation(problem, &request.deadline);
-  const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
   const Friction friction = friction_of(problem);
+  Factorization mass(to_eigen(problem.M), "M");
+  if (auto known = known_solution(problem, friction, mass, request, guess)) {
+    return *std::move(known);
+  }
+  const Condensation condensation(problem, std::move(mass), &request.deadline);
+  const LocalProblem& local = condensation.local();
   if (!condensation.finished()) return out_of_time(problem, condensation, request, guess);
   const OwnSizes own = own_sizes(problem, condensation.mass(), &local);
   const auto judge_complete = [&](Solution& solution) {

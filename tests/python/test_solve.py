@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fclib
 from ball_judge import judge
@@ -350,6 +351,55 @@ def test_a_guess_at_the_solution_needs_no_work() -> None:
         assert_solved(case.problem, result)
         assert result.iterations <= 1
         assert fclib.solve(case.problem).iterations > 1
+
+
+def of_law(law: str) -> fclib.Problem:
+    """A global problem of eight contacts."""
+    if law in ("Coulomb", "planar", "rolling"):
+        return planted_global(
+            3, nc=8, d=2 if law == "planar" else 3, rolling=law == "rolling"
+        ).problem
+    base: Any = planted_global(3, nc=16, d=2).problem
+    return fclib.GlobalSpinProblem(
+        spacedim=4,
+        M=base.M,
+        H=base.H,
+        f=base.f,
+        w=base.w,
+        mu=[0.5] * 8,
+        mu_s=[0.1] * 8,
+        coupled=int(law == "coupled"),
+    )
+
+
+@pytest.mark.parametrize("law", ["Coulomb", "planar", "rolling", "spin", "coupled"])
+def test_a_guess_that_is_the_solution_is_returned(law: str) -> None:
+    """It is judged as it is, before the problem is condensed."""
+    problem = of_law(law)
+    known = fclib.solve(problem, tol=1e-10)
+    again = fclib.solve(problem, tol=1e-8, guess=known.solution)
+    np.testing.assert_array_equal(again.solution.r, known.solution.r)
+    assert (again.status, again.iterations, again.solver) == ("converged", 0, "auto")
+    assert again.error == fclib.merit(problem, again.solution).error <= 1e-10
+    assert_solved(problem, again)
+    # who listens hears of it
+    assert fclib.solve(problem, guess=known.solution, history=True).history
+    for off in (1e-6, 1e-2):
+        near = fclib.Solution(r=known.solution.r * (1 + off))
+        better = fclib.solve(problem, tol=1e-8, guess=near)
+        assert_solved(problem, better)
+        assert better.iterations > 0
+
+
+def test_a_guess_that_moves_nothing_is_left_for_zero() -> None:
+    """Two contacts press on a body from both sides; nothing else does."""
+    H = sp.csc_array(np.array([[1.0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]]))
+    for f in (np.zeros(3), np.array([0, 0, 1e-3])):
+        problem = fclib.GlobalProblem(M=sp.eye_array(3), H=H, f=f, w=np.zeros(6), mu=[0.5, 0.5])
+        squeezed = fclib.Solution(r=np.array([2.0, 0, -f[2] / 2, 2, 0, -f[2] / 2]))
+        result = fclib.solve(problem, guess=squeezed)
+        assert_solved(problem, result)
+        np.testing.assert_array_equal(result.solution.r, squeezed.r if f.any() else np.zeros(6))
 
 
 def test_a_guess_that_does_not_fit_is_an_error() -> None:

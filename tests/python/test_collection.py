@@ -995,15 +995,15 @@ def test_collection_is_a_lazy_sequence(tmp_path: Path, monkeypatch: pytest.Monke
 # test_granular_flow.py has GranularFlow: a solution of its 10,000 contacts takes hours
 @pytest.mark.parametrize("name", [name for name in FAMILIES if name != "GranularFlow"])
 def test_family_is_built_from_its_default_scene(name: str, tmp_path: Path) -> None:
-    plan = Plan.of_family(name, problems=3)
+    plan = Plan.of_family(name, problems=2)
     # a small scene where the default one takes long
     small = getattr(collections.plan.families()[name], "small", None)
     plan = dataclasses.replace(plan, scene=collections.plan.source(name, small))
     table = collections.build([plan], tmp_path, pictures=False)
-    assert table["number"].to_pylist() == [0, 1, 2]
+    assert table["number"].to_pylist() == [0, 1]
     # one that is proved to have no solution is told so
-    expected = ["infeasible", "converged"] * 2 if name == "Squeezed" else ["converged"] * 3
-    assert table["status"].to_pylist() == expected[:3]
+    expected = ["infeasible" if name == "Squeezed" else "converged", "converged"]
+    assert table["status"].to_pylist() == expected
     assert all(verdict.ok for verdict in collections.verify(tmp_path))
 
 

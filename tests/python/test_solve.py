@@ -382,6 +382,8 @@ def test_a_guess_that_is_the_solution_is_returned(law: str) -> None:
     assert (again.status, again.iterations, again.solver) == ("converged", 0, "auto")
     assert again.error == fclib.merit(problem, again.solution).error <= 1e-10
     assert_solved(problem, again)
+    assert again.cpu_s > 0
+    assert again.setup_s > 0
     # who listens hears of it
     assert fclib.solve(problem, guess=known.solution, history=True).history
     for off in (1e-6, 1e-2):

@@ -443,6 +443,7 @@ def test_a_command_imports_what_it_needs_alone(files: list[Path]) -> None:
     for arguments, absent in (
         (["info", str(files[0])], ["mujoco", "fclib.bench", "fclib.collections"]),
         (["--help"], ["scipy.linalg", "mujoco", "pyarrow", "matplotlib", "fclib.analysis"]),
+        (["bench", "--help"], ["scipy", "mujoco", "pyarrow", "fclib.analysis"]),
     ):
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True

@@ -17,16 +17,18 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
 from fclib import _core
 from fclib._geometry import KINDS, Bodies, Contacts, rotations
 from fclib.scenes import Scene
 from fclib.scenes.shared import mjcf
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp  # the import takes a while, and a campaign does not need it
 
 Vector = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -158,7 +160,7 @@ class Handed:
         columns = np.broadcast_to(np.arange(TWIST * n).reshape(n, 1, TWIST), blocks.shape)
         there = blocks != 0
         entries = blocks[there], (rows[there], columns[there])
-        return sp.csc_array(entries, shape=(TWIST * n, TWIST * n)), pushed.ravel()
+        return columns_of(entries, (TWIST * n, TWIST * n)), pushed.ravel()
 
     def bodies(self, place: Vector, turn: Vector) -> Bodies:
         """All solids, in the poses of a state."""
@@ -311,6 +313,13 @@ def levers(
         columns.append(np.broadcast_to(j, shape).ravel())
         values.append(blocks.ravel())
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    H = sp.csc_array(entries, shape=(TWIST * len(place), 3 * nc))
+    H = columns_of(entries, (TWIST * len(place), 3 * nc))
     H.eliminate_zeros()
     return H
+
+
+def columns_of(entries: Any, shape: tuple[int, int]) -> sp.csc_array:
+    """The sparse matrix of values and their (rows, columns)."""
+    import scipy.sparse as sp
+
+    return sp.csc_array(entries, shape=shape)

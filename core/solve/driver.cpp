@@ -514,7 +514,7 @@ Result solve_global(const P& problem, const P& given, const Request& request,
     if (error <= request.settings.tolerance) return error;
     Solution other = first ? std::move(expanded) : held();
     const double other_error = judge_complete(other);
-    if (!(other_error <= request.settings.tolerance)) return error;
+    if (!(other_error < error)) return error;
     solution = std::move(other);
     return other_error;
   };

@@ -454,3 +454,34 @@ def test_no_claim_rests_on_what_closes_far_below_the_free_velocities() -> None:
 
     assert fclib.solve(closing(1e-9), tol=1e-17).status == "stalled"
     assert fclib.solve(closing(1e-3), tol=1e-17).status == "infeasible"
+
+
+def light_bodies_on_joints(seed: int) -> Any:
+    """Bodies of 1e-9 to 1e-5 kg, each on a joint of a heavy one; contacts press on them."""
+    rng = np.random.default_rng(seed)
+    k, nc = 4, 3
+    masses = np.concatenate([10 ** rng.uniform(0, 2, k), 10 ** rng.uniform(-9, -5, k)])
+    G = np.vstack([np.eye(k), -np.eye(k)])
+    H = np.zeros((2 * k, 3 * nc))
+    for c in range(nc):
+        i, j, other = rng.integers(k), rng.integers(k), rng.integers(2 * k)
+        H[k + i, 3 * c] = H[k + j, 3 * c + 1] = H[other, 3 * c + 2] = 1
+    f = np.zeros(2 * k)
+    f[:k] = -rng.uniform(1, 100, k)
+    w = rng.standard_normal(3 * nc) * 1e-3
+    return fclib.GlobalProblem(M=np.diag(masses), H=H, G=G, f=f, w=w, b=np.zeros(k), mu=[0.5] * nc)
+
+
+@pytest.mark.parametrize("seed", [29, 42, 52])
+def test_what_misses_the_tolerance_holds_its_joints(seed: int) -> None:
+    """What rounding breaks of them is no error of the best solution that was found."""
+    problem = light_bodies_on_joints(seed)
+    result = fclib.solve(problem, tol=1e-12)
+    assert not result.converged
+    # with the same r: a light body has the velocity of its heavy one
+    M, H, r = dense(problem.M).diagonal(), dense(problem.H), result.solution.r
+    force = H @ r + problem.f
+    own = (force[:4] + force[4:]) / (M[:4] + M[4:])
+    v = np.concatenate([own, own])
+    held = fclib.Solution(v=v, u=H.T @ v + problem.w, r=r, l=force[4:] - M[4:] * own)
+    assert result.error <= 1.5 * fclib.merit(problem, held).error

@@ -113,6 +113,15 @@ def virtual(file: h5py.File, name: str, values: Any) -> None:
     file.create_virtual_dataset(name, layout)
 
 
+def link_to_another_file(file: h5py.File, root: str) -> None:
+    """The main matrix is in another file, which is there."""
+    other = Path(f"{file.filename}.matrix")
+    with h5py.File(other, "w") as target:
+        file.copy(main_matrix(root), target, "matrix")
+    del file[main_matrix(root)]
+    file[main_matrix(root)] = h5py.ExternalLink(other.name, "/matrix")
+
+
 def labels(file: h5py.File, name: str, values: Any) -> None:
     """Integers that have names."""
     kind = h5py.enum_dtype({"none": 0, "one": 1, "two": 2}, basetype="i4")
@@ -226,6 +235,7 @@ CHANGES: dict[str, Change] = {
     "LZF": stored(entries, by_hand(h5t.IEEE_F64LE, chunk=2, filter=h5z.FILTER_LZF)),
     "data in another file": stored(entries, in_another_file),
     "a view of another file": stored(entries, virtual),
+    "a link to another file": link_to_another_file,
     # texts and what stands beside
     "a text filled with blanks": title(changed(h5t.FORTRAN_S1, size=12), b"title       "),
     "a text of UTF-8": title(changed(STRING, size=12, cset=h5t.CSET_UTF8), "größe".encode()),

@@ -434,6 +434,7 @@ WRONG_IN_3_1 = {
     "n-bit": "HDF5 trusts what it unpacks, as in scale-offset",
     "data in another file": "a file could show what its reader may read, and its sender may not",
     "a view of another file": "as data in another file",
+    "a link to another file": "as data in another file",
 }
 # files of which 3.1 hands out a title that is longer than it should be, or no text at all: it asks
 # for the memory of one element, and looks for no end

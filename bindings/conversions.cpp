@@ -2,6 +2,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 
+#include <concepts>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,7 +28,7 @@ void bind_conversions(nb::module_& m) {
           },
           nb::scope(cls), nb::name(name), nb::is_method(), nb::call_guard<Unlocked>(), doc);
     };
-    if constexpr (requires(const P& p) { condense(p); }) {
+    if constexpr (std::derived_from<P, GlobalProblem>) {
       method(
           "condense", [](const P& p) { return condense(p); },
           "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"

@@ -343,11 +343,11 @@ class Odd:
     name: str
 
 
-def make(folder: Path) -> Iterator[Odd]:
-    """All changes of a local file and of a global one, and whole files of another kind."""
+def make(folder: Path, changes: dict[str, Change] = CHANGES) -> Iterator[Odd]:
+    """All changes of a local file and of a global one."""
     rng = np.random.default_rng(SEED)
     for kind in ("local", "global"):
-        for name, change in CHANGES.items():
+        for name, change in changes.items():
             seed, d, nc = int(rng.integers(1000)), int(rng.integers(2, 4)), int(rng.integers(2, 5))
             mixed = 2 * int(rng.integers(2))
             storage = str(rng.choice(["csr", "csc", "coo"])) if kind == "local" else "coo"

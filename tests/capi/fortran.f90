@@ -16,6 +16,7 @@ end module
 
 program checks
   use, intrinsic :: iso_c_binding
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: error_unit
   use fclib
   use hearing
@@ -30,6 +31,8 @@ program checks
   call words
   call sliding_ball
   call all_kinds
+  call bodies
+  call steps
   call failures
   call check(fclib_solver(1) /= "", "there is a solver")
   call check(fclib_solver(1000) == "" .and. fclib_solver(0) == "", "and not any number of them")
@@ -267,6 +270,116 @@ contains
     call fclib_get_sizes(global_rolling, n, m, p, nc)
     call check(all([n, m, p, nc] == [5, 5, 0, 1]), "its sizes")
     call fclib_delete(global_rolling)
+  end subroutine
+
+  ! ---- where bodies are, what they weigh and how they move
+
+  ! a ball of 2 kg above the ground; the arrays are the caller's
+  subroutine bodies
+    type(fclib_local) :: problem
+    type(fclib_geometry) :: geometry
+    integer(c_int), target :: body(2, 1), moves(2), kinds(2)
+    real(dp), target :: point(3, 1), normal(3, 1), tangent(3, 1), place(3, 2), sizes(3, 2), mass(2)
+    real(dp), target :: inertia(3, 2), center(3, 2), axes(4, 2), velocity(6), impulse(6)
+    character(kind=c_char, len=7), target :: names(2), unit
+    type(c_ptr), target :: name(2)
+    character(:), allocatable :: path
+    integer :: k
+    path = path_of("bodies.hdf5") // c_null_char
+    body(:, 1) = [0, 1]
+    point(:, 1) = [0, 0, 0]
+    normal(:, 1) = [0, 0, 1]
+    tangent(:, 1) = [1, 0, 0]
+    moves = [0, 1]
+    place = reshape([0, 0, 0, 3, 4, 5] * 1._dp, [3, 2])
+    kinds = [FCLIB_PLANE, FCLIB_SPHERE]
+    sizes = reshape([0, 0, 0, 5, 0, 0] * 1._dp, [3, 2])
+    mass = [0, 2]
+    inertia = reshape([0, 0, 0, 7, 8, 9] * 1._dp, [3, 2])
+    center = reshape([0, 0, 0, 1, 2, 3] * 0.125_dp, [3, 2])
+    axes = reshape([1, 0, 0, 0, 0, 1, 0, 0] * 1._dp, [4, 2])
+    velocity = [1, 2, 3, 4, 5, 6]
+    impulse = -0.5_dp * velocity
+    names = ["ground" // c_null_char, "ball" // c_null_char // "  "]
+    unit = "mm" // c_null_char
+    name = [(c_loc(names(k)), k=1, 2)]
+
+    geometry%nc = 1
+    geometry%body = c_loc(body)
+    geometry%point = c_loc(point)
+    geometry%normal = c_loc(normal)
+    geometry%tangent = c_loc(tangent)
+    geometry%nb = 2
+    geometry%name = c_loc(name)
+    geometry%moves = c_loc(moves)
+    geometry%place = c_loc(place)
+    geometry%ns = 2
+    geometry%shape_kind = c_loc(kinds)
+    geometry%shape_size = c_loc(sizes)
+    geometry%unit = c_loc(unit)
+    geometry%mass = c_loc(mass)
+    geometry%inertia = c_loc(inertia)
+    geometry%center = c_loc(center)
+    geometry%axes = c_loc(axes)
+    geometry%n = 6
+    geometry%velocity = c_loc(velocity)
+    geometry%impulse = c_loc(impulse)
+
+    call falling(problem)
+    call check(fclib_write(problem, path_of("bodies.hdf5")), "the problem of the bodies")
+    call check(fclib_write_geometry(geometry, path) == 0, "the size of the struct is missing")
+    call check(index(fclib_error(), "geometry->size") > 0, "and that is said")
+    geometry%size = c_sizeof(geometry)
+    velocity(6) = ieee_value(0._dp, ieee_quiet_nan)
+    call check(fclib_write_geometry(geometry, path) == 0, "a velocity that is no number")
+    call check(index(fclib_error(), "/bodies/velocity[5]") > 0, "which is told")
+    velocity(6) = 6
+    call check(fclib_write_geometry(geometry, path) == 1, "write the bodies")
+    call check(fclib_write_geometry(geometry, path) == 0, "they are there already")
+    call fclib_delete(problem)
+  end subroutine
+
+  ! the ball touches, and its speed down is 1
+  subroutine falling(problem)
+    type(fclib_local), intent(inout) :: problem
+    call one_contact(problem%W, 3)
+    call fclib_set(problem%q, [-1._dp, 0._dp, 0._dp])
+    call fclib_set(problem%mu, [0.5_dp])
+  end subroutine
+
+  ! ---- many problems in one file
+
+  subroutine steps
+    type(fclib_local) :: problem, again
+    type(fclib_solution) :: solution, other
+    type(c_ptr) :: sequence
+    real(dp), pointer :: q(:)
+    character(:), allocatable :: path
+    integer :: k
+    path = path_of("steps.h5")
+    call falling(problem)
+    call fclib_allocate(solution, problem)
+    q => fclib_vector(problem%q, 3)
+    sequence = fclib_sequence_create(path // c_null_char, c_null_ptr)
+    call check(c_associated(sequence), "a sequence")
+    do k = 1, 3
+      q(1) = -k
+      call check(fclib_solve(problem, "nsgs", solution), "solve a step")
+      call check(fclib_sequence_add_local(sequence, problem, 0) == 1, "add a step")
+      call check(fclib_sequence_add_solution(sequence, solution) == 1, "add its solution")
+    end do
+    call check(fclib_sequence_flush(sequence) == 1, "confirm")
+    call check(fclib_sequence_size(path // c_null_char) == 3, "three steps")
+    call check(fclib_sequence_close(sequence) == 1, "close")
+    call check(fclib_read(path // "#2", again), "read the last step")
+    call check(fclib_read(path // "#2", other), "and its solution")
+    q => fclib_vector(again%q, 3)
+    call check(q(1) == -3, "it is the last one")
+    call check(fclib_merit(again, MERIT_2, other) < 1e-8, "solved")
+    call fclib_delete(other)
+    call fclib_delete(solution)
+    call fclib_delete(again)
+    call fclib_delete(problem)
   end subroutine
 
   ! ---- what goes wrong

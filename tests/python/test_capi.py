@@ -326,6 +326,24 @@ def fortran(programs: Path) -> Path:
 def test_what_the_fortran_module_promises(fortran: Path, tmp_path: Path) -> None:
     done = subprocess.run([fortran, tmp_path], capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    path = tmp_path / "bodies.hdf5"
+    problem = fclib.read(path)
+    assert fclib.left_out(path) == []
+    assert problem.contacts is not None
+    assert problem.contacts.body.tolist() == [[0, 1]]
+    bodies = problem.bodies
+    assert bodies is not None
+    assert (bodies.names, bodies.unit) == (["ground", "ball"], "mm")
+    assert bodies.place.tolist() == [[0, 0, 0], [3, 4, 5]]
+    assert bodies.mass.tolist() == [0, 2]
+    assert bodies.inertia.tolist() == [[0, 0, 0], [7, 8, 9]]
+    assert bodies.center.tolist() == [[0, 0, 0], [0.125, 0.25, 0.375]]
+    assert bodies.axes.tolist() == [[1, 0, 0, 0], [0, 1, 0, 0]]
+    assert bodies.velocity.tolist() == [1, 2, 3, 4, 5, 6]
+    assert bodies.impulse.tolist() == [-0.5, -1, -1.5, -2, -2.5, -3]
+    steps = fclib.Sequence(tmp_path / "steps.h5")
+    firsts = [step.q[0] for step in steps if isinstance(step, fclib.LocalProblem)]
+    assert firsts == [-1, -2, -3]
 
 
 @pytest.mark.long

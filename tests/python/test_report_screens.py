@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import shutil
 from collections.abc import Iterator
@@ -617,10 +618,20 @@ def test_histograms_have_whole_counts_and_follow_the_theme(
 # ---- paper
 
 
+# curves with long names: as many columns as paper has room for
+LONG_NAMES = """() => document.querySelector("main").append(Fclib.lines({
+  name: "long", title: "long", xlog: true, xrange: [1, 10], yrange: [0, 1], ypercent: true,
+  xname: "x", xlabel: "x", ylabel: "y",
+  series: [...Array(8)].map((_, k) =>
+    ({ name: `of a long name ${k}`, x: [1, 2], y: [0, 1], style: k })),
+}))"""
+
+
 @pytest.mark.parametrize("address", ["#/overview", PROBLEM, "#/family/small/BoxesStack"])
 def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Path) -> None:
     page = open_page(browser, site, address, viewport=DESK, color_scheme="dark")
     page.wait_for_function("window.Plotly")
+    page.evaluate(LONG_NAMES)
     hidden = page.locator(".plot:not([data-drawn])").count()
     page.emulate_media(media="print", color_scheme="dark")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -635,6 +646,17 @@ def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Pat
         assert drawn, hidden
         assert abs(wide - svg) < 5  # the border
         assert wide < 720  # of A4, within margins
+    if address == PROBLEM:
+        # it is as wide as the page, also before the browser lays the page out for paper
+        assert page.locator(".scene .plot").bounding_box()["width"] > 600
+    names = page.locator(".plot[aria-label^='long'] .legendtext")
+    boxes = [one.bounding_box() for one in names.all()]
+    assert len(boxes) == 8
+    for one, other in itertools.pairwise(boxes):
+        # in a row, with room for the line before a name; or in the next row
+        assert one["x"] + one["width"] + 38 <= other["x"] or one["y"] + 5 < other["y"]
+    right = page.locator(".plot[aria-label^='long']").bounding_box()
+    assert all(one["x"] + one["width"] < right["x"] + right["width"] for one in boxes)
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     for what in ("header.top", "footer", ".controls", ".tools", "summary", ".copy button"):
         for one in page.locator(what).all():

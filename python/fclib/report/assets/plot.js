@@ -95,8 +95,8 @@
     };
   };
 
-  /* options: name, title, draw(width) -> {data, layout}, height, says: what it holds and which keys it
-     knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
+  /* options: name, title, draw(width) -> {data, layout}, height, says: what it holds and which
+     keys it knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
      still: no tools and no table, first(width, height): a drawing that needs no library
      The box has data-shown if anything is drawn, and data-drawn if Plotly has drawn it. */
   Fclib.plot = (options) => {

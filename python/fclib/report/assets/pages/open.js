@@ -33,7 +33,7 @@
     const { name } = one.open.find((r) => r.by) || one.open[0];
     const steps = one.published
       ? [
-          [`fclib collection status ${name} --out open.hdf5`, "the problem, with the best solution"],
+          [`fclib collection status ${name} --out open.hdf5`, "it, with the best solution"],
           ["fclib check open.hdf5", "its error, as it will be judged"],
           ['fclib collection take yours.hdf5 --by "you, and how"', "taken if better by a tenth"],
         ]
@@ -75,9 +75,7 @@
     for (const one of list) {
       page.append(h("h2", {}, one.set));
       page.append(
-        one.open.length
-          ? Fclib.openProblems(one)
-          : h("p", {}, "Each of these problems is solved."),
+        one.open.length ? Fclib.openProblems(one) : h("p", {}, "Each of these problems is solved."),
         ...(one.open.length ? better(one) : []),
         Fclib.table({
           caption:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import inspect
 import math
+import shlex
 import types
 import typing
 from collections.abc import Callable, Iterable, Sequence
@@ -285,6 +286,27 @@ def find_solver(name: str) -> _core.SolverInfo:
         return _registered[name]
     known = [info.name for info in solvers()]
     raise _core.OptionError(
-        f"solver '{name}': unknown; the nearest are {nearest(name, known)};"
+        f"solver '{name}': unknown; the nearest are {nearest(name.partition(' ')[0], known)};"
         " `fclib solvers` lists all"
     )
+
+
+def parse_solver(text: str) -> tuple[str, dict[str, str]]:
+    """The name and the options of "nsgs relaxation=1.2"; all after "cmd:" is one name.
+
+    Raises:
+        OptionError: an option is not of the form name=value.
+    """
+    if text.startswith("cmd:"):
+        return text, {}
+    try:
+        name, *pairs = shlex.split(text) or [""]
+    except ValueError as error:
+        raise _core.OptionError(f"solver {text!r}: {error}") from None
+    options = {}
+    for pair in pairs:
+        key, _, value = pair.partition("=")
+        if not (key and value):
+            raise _core.OptionError(f"solver {text!r}: '{pair}' is not of the form name=value")
+        options[key] = value
+    return name, options

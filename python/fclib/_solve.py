@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core, _laws
-from fclib._registry import find_solver
+from fclib._registry import find_solver, parse_solver
 
 Problem: TypeAlias = _laws.Problem
 
@@ -53,7 +53,7 @@ def solve(
 
     Args:
         problem: a local or a global problem, with or without bilateral constraints.
-        solver: a name of ``fclib.solvers()``.
+        solver: a name of ``fclib.solvers()``, also with options: ``"nsgs relaxation=1.2"``.
         tol: bound on ``Merit.error``.
         max_iterations: limit of the solver's iterations, None: its own default.
         time_limit: [s] limit of wall-clock time.
@@ -90,6 +90,9 @@ def solve(
         raise
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
+    if isinstance(solver, str) and " " in solver:
+        solver, own = parse_solver(solver)
+        options = {**own, **options}
     values = {name: _plain(name, value) for name, value in options.items()} if options else {}
     try:
         return _core.solve(

@@ -100,7 +100,7 @@ div.math { overflow-x: auto; margin: 1em 0; }
 div.math math { margin: 0.4em 0; }
 article img { max-width: 100%; height: auto; }
 article table { font-size: 0.85em; }
-article table img { max-width: none; }
+article table img { max-width: 30vw; }
 article td:first-child code { white-space: nowrap; }
 article .align-right { margin: 0 0 1em 1.5em; }
 .versions { padding: 0 var(--sidebar-item-spacing-horizontal); font-size: 0.85em; }

@@ -26,8 +26,10 @@ def pages(root: Path, runs: bool) -> Iterator[tuple[str, str | bytes]]:
             output, pictures = run(script, Path(folder)) if runs else ("", [])
             for picture in pictures:
                 yield f"examples/{script.stem}-{picture.name}", picture.read_bytes()
-            shown = "".join(f"![{p.stem}]({script.stem}-{p.name})" for p in pictures[:1])
-            rows.append((script.stem, title, shown))
+            place = f"({script.stem}-{pictures[0].name})" if pictures else ""
+            shown = f"![{script.stem}]{place}{{width=240px}}" if pictures else ""
+            what = title.partition(f": {script.name}")[0].rstrip(".")
+            rows.append((shown, f"[{what}]({script.stem}.md), `{script.name}`"))
             yield f"examples/{script.stem}.md", page(script, title, rest, output, pictures)
     lines = [
         "# Examples",
@@ -37,9 +39,8 @@ def pages(root: Path, runs: bool) -> Iterator[tuple[str, str | bytes]]:
     lines[-1] += "was made; times are of that machine. Those in C, C++ and Fortran are on "
     lines[-1] += "[a page of their own](../compiled.md)."
     # pictures first
-    lines += ["", "| script | | |", "|---|---|---|"]
-    for stem, title, shown in sorted(rows, key=lambda row: not row[2]):
-        lines.append(f"| [{stem}.py]({stem}.md) | {title} | {shown} |")
+    lines += ["", "| | |", "|---|---|"]
+    lines += [f"| {' | '.join(row)} |" for row in sorted(rows, key=lambda row: not row[0])]
     yield "examples/index.md", "\n".join(lines) + "\n"
 
 

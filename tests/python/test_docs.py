@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import json
 import re
 import subprocess
@@ -182,6 +183,32 @@ def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
     python = (site / "python.html").read_text()
     for name in fclib.__all__:
         assert name.startswith("_") or f'id="{name.lower().replace("_", "-")}"' in python, name
+
+
+def test_examples_begin_with_their_pictures_in_a_small_size(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(root / "scripts/site")
+    examples = importlib.import_module("examples")
+    (tmp_path / "drawn.png").write_bytes(b"drawn")
+
+    def run(script: Path, folder: Path) -> tuple[str, list[Path]]:
+        return "said", [tmp_path / "drawn.png"] if script.stem == "robot" else []
+
+    monkeypatch.setattr(examples, "run", run)
+    pages = dict(examples.pages(root, runs=True))
+    assert pages["examples/robot-drawn.png"] == b"drawn"
+    assert "said" in pages["examples/robot.md"]
+    rows = re.findall(
+        r"^\| (.*) \| \[(.*)\]\((\w+)\.md\), `\w+\.py` \|$", pages["examples/index.md"], re.M
+    )
+    assert len(rows) == len(list((root / "examples/python").glob("*.py")))
+    assert rows[0] == (
+        "![robot](robot-drawn.png){width=240px}",
+        "From a robot in MJCF to a benchmark",
+        "robot",
+    )
+    assert not any(shown for shown, *_ in rows[1:])
 
 
 # ---- in a browser

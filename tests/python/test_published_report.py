@@ -141,5 +141,7 @@ def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:
         if p[3:] and p[3].startswith("H4s")
     ]
     assert any("84 published runs; times as measured" in text for text in content)
+    assert "84 published runs" in said("profile", "--with", part)
+    said("profile", code=2)
     stores = [run / "small.sqlite"] * 2
     said("report", *stores, "--with", part, "--out", out, code=2)

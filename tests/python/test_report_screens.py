@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import shutil
 from collections.abc import Iterator
@@ -415,18 +416,30 @@ def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
 
 
 def store_of(path: Path, errors: dict[int, dict[str, float]], solvers: tuple[str, ...]) -> Path:
-    """Runs of made-up problems: by number and solver the error; without one it is solved."""
+    """Runs of made-up problems: by number and solver the error; without one it is solved.
+
+    If the error is within the tolerance, it came too late. If it is infinite, nothing came.
+    """
     limits = Limits(time=10.0, wall=20.0, memory=1000.0)
     machine = {"node": "here", "cpu": "Abacus"}
     with Store(path) as store:
         for k, fact in enumerate(made_facts(len(errors))):
             for label in solvers:
                 error = errors[k].get(label)
+                status = (
+                    "converged"
+                    if error is None
+                    else "cpu_limit"
+                    if error == np.inf
+                    else "time_limit"
+                    if error <= 1e-8
+                    else "stalled"
+                )
                 choice = SolverChoice("nsgs", {}, f"of {label}", "splitting", "fclib", label)
                 record = Record(
-                    status="stalled" if error else "converged",
+                    status=status,
                     cpu_s=0.5,
-                    merits={"error": error or 1e-9},
+                    merits={} if error == np.inf else {"error": error or 1e-9},
                     machine=machine,
                 )
                 store.add(Job(fact, choice, 1e-8, limits, 0, 1), record)
@@ -434,24 +447,37 @@ def store_of(path: Path, errors: dict[int, dict[str, float]], solvers: tuple[str
 
 
 def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_path: Path) -> None:
-    """No class of another set; what no solver of the report solves is open, with its best error."""
-    errors = {0: {"auto": 3e-3, "nsgs": 2e-5}, 1: {"auto": 1e-2}, 2: {}}
+    """No class of another set; what no solver of the report solves is open, with its best error.
+
+    It is also open if nothing came of any solver, and hard if a solution came too late.
+    """
+    never = {"auto": np.inf, "nsgs": np.inf}
+    errors = {0: {"auto": 3e-3, "nsgs": 2e-5}, 1: {"auto": 1e-2}, 2: {}, 3: never, 4: {}}
+    errors[4] = {"auto": 1e-9, "nsgs": 1e-2}
     store = store_of(tmp_path / "runs.sqlite", errors, ("auto", "nsgs"))
     with Campaigns([store]) as campaigns:
         build_site(campaigns, tmp_path / "site", views=0)
     (own,) = read_data(tmp_path / "site", "site")["ratings"]
     assert own["set"] == "this report"
     assert own["families"] == [
-        {"family": f"Family{k}", "easy": int(k == 2), "hard": int(k == 1), "open": int(k == 0)}
-        for k in range(3)
+        {"family": f"Family{k}", "easy": int(k == 2), "hard": int(k in (1, 4))}
+        | {"open": int(k in (0, 3))}
+        for k in range(5)
     ]
-    assert own["open"] == [{"problem": "Family0/00000", "error": 2e-5, "by": "nsgs"}]
+    assert own["open"] == [
+        {"problem": "Family0/00000", "error": 2e-5, "by": "nsgs"},
+        {"problem": "Family3/00003"},
+    ]
     for address in ("#/classes", "#/overview"):
         page = open_page(browser, tmp_path / "site", address, viewport=DESK)
         assert "standard" not in page.inner_text("main")
-        row = page.locator("table", has_text="1 open problem of this report").locator("tbody tr")
-        assert row.locator("th, td").all_inner_texts() == ["Family0/00000", "2e-5", "nsgs"]
-        row.locator("a").first.click()
+        table = page.locator("table", has_text="2 open problems of this report")
+        cells = table.locator("tbody").locator("th, td").all_inner_texts()
+        assert cells[:3] == ["Family0/00000", "2e-5", "nsgs"]
+        assert cells[3:] == ["Family3/00003", "–", "no solver returned any"]
+        if address == "#/classes":
+            assert "fclib solve --time-limit" in page.inner_text("main")
+        table.locator("tbody a").first.click()
         page.wait_for_selector("main[data-page=problem]")
         page.close()
 
@@ -481,6 +507,35 @@ def test_pages_say_no_more_and_no_less_than_is_known(browser: Any, tmp_path: Pat
     )
     assert shown == ["–"] * 6 + ["12.5 %", "1.25e-1"]
     assert "1 solver, 1 problem, 1 family, 1 run, 0 % of them solved" in page.inner_text("main")
+    page.close()
+
+
+def test_a_problem_of_a_store_alone_says_what_is_not_known(browser: Any, tmp_path: Path) -> None:
+    """Of a published run, say: its file and its analysis are elsewhere, and its digest is known."""
+    store = store_of(tmp_path / "runs.sqlite", {0: {}, 1: {}}, ("mine",))
+    with Store(store) as opened:
+        opened.db.execute("UPDATE machines SET node = cpu")
+        opened.db.execute("UPDATE problems SET formulation = 'G3DFC' WHERE family = 'Family0'")
+        opened.seal()
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, tmp_path / "site", views=0)
+    # what a store has of a global problem is of M
+    entries = [row_of(tmp_path / "site", f"Family{k}/0000{k}")["nnz_W"] for k in range(2)]
+    assert entries == [None, made_facts(2)[1].nnz]
+    digest = made_facts(1)[0].hash
+    page = open_page(browser, tmp_path / "site", "#/problem/Family0/00000", viewport=DESK)
+    names = page.locator("dl.chief dt").all_inner_texts()
+    told = dict(zip(names, page.locator("dl.chief dd").all_inner_texts(), strict=True))
+    assert told["μ"] == "not in the stores"
+    assert told["rank of W"] == told["existence, uniqueness"] == "not analysed"
+    assert page.locator("dl.facts code.sum").inner_text() == digest
+    assert f"{{fclib.digest {digest}, FCLIB" in page.locator("#cite + .copy").inner_text()
+    facts = page.locator("dl.chief").bounding_box()
+    assert facts["x"] < page.locator("h1").bounding_box()["x"] + 5  # no empty place for a picture
+    page.close()
+    page = open_page(browser, tmp_path / "site", "#/overview", viewport=DESK)
+    machine = page.locator("dl.facts dt", has_text="machine").locator("+ dd").inner_text()
+    assert machine == "Abacus"
     page.close()
 
 
@@ -563,10 +618,20 @@ def test_histograms_have_whole_counts_and_follow_the_theme(
 # ---- paper
 
 
+# curves with long names: as many columns as paper has room for
+LONG_NAMES = """() => document.querySelector("main").append(Fclib.lines({
+  name: "long", title: "long", xlog: true, xrange: [1, 10], yrange: [0, 1], ypercent: true,
+  xname: "x", xlabel: "x", ylabel: "y",
+  series: [...Array(8)].map((_, k) =>
+    ({ name: `of a long name ${k}`, x: [1, 2], y: [0, 1], style: k })),
+}))"""
+
+
 @pytest.mark.parametrize("address", ["#/overview", PROBLEM, "#/family/small/BoxesStack"])
 def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Path) -> None:
     page = open_page(browser, site, address, viewport=DESK, color_scheme="dark")
     page.wait_for_function("window.Plotly")
+    page.evaluate(LONG_NAMES)
     hidden = page.locator(".plot:not([data-drawn])").count()
     page.emulate_media(media="print", color_scheme="dark")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -581,6 +646,17 @@ def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Pat
         assert drawn, hidden
         assert abs(wide - svg) < 5  # the border
         assert wide < 720  # of A4, within margins
+    if address == PROBLEM:
+        # it is as wide as the page, also before the browser lays the page out for paper
+        assert page.locator(".scene .plot").bounding_box()["width"] > 600
+    names = page.locator(".plot[aria-label^='long'] .legendtext")
+    boxes = [one.bounding_box() for one in names.all()]
+    assert len(boxes) == 8
+    for one, other in itertools.pairwise(boxes):
+        # in a row, with room for the line before a name; or in the next row
+        assert one["x"] + one["width"] + 38 <= other["x"] or one["y"] + 5 < other["y"]
+    right = page.locator(".plot[aria-label^='long']").bounding_box()
+    assert all(one["x"] + one["width"] < right["x"] + right["width"] for one in boxes)
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     for what in ("header.top", "footer", ".controls", ".tools", "summary", ".copy button"):
         for one in page.locator(what).all():

@@ -456,6 +456,9 @@ def test_contradicting_bilateral_constraints_are_unsuitable() -> None:
     [
         ({"solver": "no such solver"}, "no such solver"),
         ({"solver": ""}, "solver"),
+        ({"solver": "nsgs relaxation"}, "'relaxation' is not of the form name=value"),
+        ({"solver": "nsgs relaxatio=1"}, "relaxatio"),
+        ({"solver": "nsgs 'relaxation=1"}, "quotation"),
         ({"no_such_option": 1}, "no_such_option"),
         ({"relaxation": "fast"}, "relaxation"),
         ({"relaxation": True}, "relaxation"),
@@ -511,6 +514,18 @@ def test_every_configuration_solves(options: dict[str, Any]) -> None:
     for make, d, p in itertools.product([planted_local, planted_global], [2, 3], [0, 2]):
         case = make(5, d=d, nc=8, p=p)
         assert_solved(case.problem, fclib.solve(case.problem, "nsgs", **options))
+
+
+def test_a_solver_has_its_options_in_its_name_as_on_the_command_line() -> None:
+    problem = hard()
+
+    def result(solver: str, **options: Any) -> Any:
+        return fclib.solve(problem, solver, tol=0, max_iterations=3, **options).solution.r
+
+    apart = result("nsgs", relaxation=1.2)
+    np.testing.assert_array_equal(result("nsgs relaxation=1.2"), apart)
+    np.testing.assert_array_equal(result("nsgs relaxation=0.9", relaxation=1.2), apart)
+    assert np.abs(result("nsgs") - apart).max() > 1e-6
 
 
 def test_the_seed_chooses_the_order() -> None:

@@ -29,7 +29,7 @@ from rich.table import Table
 from rich.text import Text
 
 import fclib
-from fclib import _sequence
+from fclib import _registry, _sequence
 from fclib._regular import regular
 
 
@@ -158,15 +158,13 @@ def parse_solver(text: str, pairs: Sequence[str] = ()) -> tuple[str, dict[str, s
 
     A solver or an option that is unknown is a usage error.
     """
-    from fclib.bench.campaign import CampaignError, parse_solver
-
     try:
-        entries = parse_solver(text)
-        options = entries.get("options", {}) | parse_options(pairs)
-        fclib.find_solver(entries["name"]).check_options(options)
-    except (CampaignError, fclib.OptionError) as error:
+        name, own = _registry.parse_solver(text)
+        options = own | parse_options(pairs)
+        fclib.find_solver(name).check_options(options)
+    except fclib.OptionError as error:
         usage_error(error)
-    return entries["name"], options
+    return name, options
 
 
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -48,7 +48,10 @@ class Forms(str, Enum):
 
 
 def command(
-    store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
+    store: Annotated[
+        Path | None,
+        typer.Argument(help="A store of `fclib bench`; it may be left out if --with is given."),
+    ] = None,
     metric: Annotated[Metric, typer.Option(help="What is compared.")] = CPU_TIME,
     solver: Annotated[list[str] | None, typer.Option(help="Only these, by their labels.")] = None,
     of_set: Annotated[
@@ -128,6 +131,13 @@ def command(
         raise typer.BadParameter(
             "--figure makes one figure, and no tables: leave out --out, --json"
         )
+    runs: AbstractContextManager[tuple[Path, str]]
+    if beside:
+        runs = joined(store, beside, machine, as_measured)
+    elif store is not None:
+        runs = nullcontext((store, ""))
+    else:
+        raise typer.BadParameter("name a store, or published runs by --with")
     chosen: dict[str, Any] = {
         "sets": of_set or (),
         "families": family or (),
@@ -146,8 +156,7 @@ def command(
         "weigh": weigh.value,
     }
     try:
-        own = nullcontext((store, ""))
-        with joined(store, beside, machine, as_measured) if beside else own as (whole, note):
+        with runs as (whole, note):
             if figure:
                 from fclib.report import write_figure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import tempfile
 from collections import Counter, defaultdict
@@ -239,6 +240,7 @@ class Campaigns:
 
     # ---- one problem
 
+    @functools.cached_property
     def least_errors(self) -> dict[str, tuple[float, str]]:
         """Of each problem the least error of a run at the smallest tolerance, and its solver."""
         found: dict[str, tuple[float, str]] = {}
@@ -259,7 +261,7 @@ class Campaigns:
                 yield digest, [self._run(row, store, reported) for row in rows]
 
     def _run(self, row: Mapping[str, Any], store: Store, reported: set[int]) -> dict[str, Any]:
-        keys = ("solver", "tol", "status", "message", "iterations", "error")
+        keys = ("solver", "tol", "repeat", "status", "message", "iterations", "error")
         found = {key: row[key] for key in (*keys, "cpu_s", "wall_s", "memory_mb", "time_limit")}
         found["form"] = row["formulation"]
         if row["run"] in reported:

@@ -147,7 +147,7 @@ OF_RUNS = (
 SILENT = ("title", "number", "tol", "solver", "global_file", "local_file", "solved_of", "rows_W")
 # columns of a catalogue that are of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
-HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
+HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version", "rating"}  # class is newer
 
 
 def _no_progress(what: str, done: int, total: int) -> None:
@@ -280,7 +280,7 @@ class Problems:
         for row, digest in zip(self.rows, self.digests, strict=True):
             own = rated.get(digest)
             if own is not None:
-                row |= rated_by(own.solved, own.voters)
+                row |= rated_as(own.rating, own.solved, own.voters)
         return found
 
     def _add_runs(self, campaigns: Campaigns) -> None:
@@ -312,7 +312,9 @@ class Problems:
                 taken.add(name)
                 place = len(self.rows)
                 known = {key: value for key, value in facts.items() if key != "same_as"}
-                self.rows.append({**known, "id": name, "nnz_W": facts["nnz"]})
+                # of a global problem the entries of M are known
+                entries = None if facts["formulation"].startswith("G") else facts["nnz"]
+                self.rows.append({**known, "id": name, "digest": digest, "nnz_W": entries})
                 self.files.append(path)
                 self.digests.append(digest)
             self.places[digest] = place
@@ -350,10 +352,10 @@ def _is_of(row: Mapping[str, Any], digest: str, facts: Mapping[str, Any]) -> boo
     return same and str(row["formulation"]) == f"G{facts['formulation']}"
 
 
-def rated_by(solved: int, voters: int) -> dict[str, Any]:
+def rated_as(name: str, solved: int, voters: int) -> dict[str, Any]:
     """The class of a problem, and how many of the solvers that take it solve it."""
     return {
-        "class": rating(solved, voters),
+        "class": name,
         "solved_by": solved / voters,
         "solved_of": f"{solved} of {counted(voters, 'solver')}",
     }
@@ -553,12 +555,18 @@ class _Writer:
 
     def _rate(self, campaigns: Campaigns) -> None:
         """The class of problems without stored runs, by these runs at the smallest tolerance."""
-        costs = campaigns.every.at(campaigns.tolerances[-1])
-        solved, voters = costs.solved.sum(axis=1), costs.there.sum(axis=1)
-        for k, instance in enumerate(costs.instances):
+        tol = campaigns.tolerances[-1]
+        costs = campaigns.every.at(tol)
+        for instance, cells, there in zip(costs.instances, costs.solved, costs.there, strict=True):
             row = self.problems.rows[self.problems.places[instance.hash]]
-            if not row.get("class") and voters[k]:
-                row |= rated_by(int(solved[k]), int(voters[k]))
+            solved, voters = int(cells.sum()), int(there.sum())
+            if row.get("class") or not voters:
+                continue
+            found = rating(solved, voters)
+            best = campaigns.least_errors.get(instance.hash)
+            if found == "open" and best and best[0] <= tol:
+                found = "hard"  # a solution is known, which came too late; as in the collection
+            row |= rated_as(found, solved, voters)
 
     def _views(self) -> tuple[int, dict[tuple[str, str], list[int]]]:
         """Draw all problems. Return the number of views, and the steps of each family."""
@@ -662,27 +670,34 @@ def _records_of_classes(problems: Problems, campaigns: Campaigns | None) -> list
         here = {places[row.digest]: row for row in rows if row.digest in places and row.rating}
         published |= here.keys()
         open_ones = [
-            {"problem": problems.rows[k]["id"], "error": best.error, "by": best.solver}
-            | {"date": best.date}
+            {"problem": problems.rows[k]["id"], "name": row.id}
+            | ({"error": run.error, "by": run.solver, "date": run.date} if run else {})
             for k, row in here.items()
-            if row.rating == "open" and (best := row.best) is not None
+            if row.rating == "open"
+            for run in [row.best]
         ]
-        known = {"set": name, "basis": str(basis), "published": True, "open": open_ones}
+        known = {"set": name, "basis": str(basis), "published": True, "open": _sorted(open_ones)}
         found.append(known | {"families": _classes(problems, here)})
     own = [k for k, row in enumerate(problems.rows) if row.get("class") and k not in published]
     own = [k for k in own if not problems.rows[k].get("same_as")]
     if own and campaigns is not None:
         tol = campaigns.tolerances[-1]
-        best = {problems.places[key]: run for key, run in campaigns.least_errors().items()}
+        best = {problems.places[key]: run for key, run in campaigns.least_errors.items()}
         open_ones = [
-            {"problem": problems.rows[k]["id"], "error": best[k][0], "by": best[k][1]}
+            {"problem": problems.rows[k]["id"]}
+            | ({"error": best[k][0], "by": best[k][1]} if k in best else {})
             for k in own
-            if problems.rows[k]["class"] == "open" and k in best
+            if problems.rows[k]["class"] == "open"
         ]
         basis = f"to {tol:g}, by the runs of this report"
         known = {"set": "this report", "basis": basis, "published": False}
-        found.append(known | {"open": open_ones, "families": _classes(problems, own)})
+        found.append(known | {"open": _sorted(open_ones), "families": _classes(problems, own)})
     return list(rounded(found, DIGITS))
+
+
+def _sorted(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Open problems, the best errors first; last those of which no solver returned anything."""
+    return sorted(found, key=lambda one: one.get("error", math.inf))
 
 
 def _classes(problems: Problems, places: Iterable[int]) -> list[dict[str, Any]]:

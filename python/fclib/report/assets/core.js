@@ -12,7 +12,10 @@ Fclib.put = (name, value) => {
 };
 // large data come compressed
 Fclib.putPacked = (name, text) => {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const found = atob(text);
+  const bytes = new Uint8Array(found.length);
+  // Uint8Array.from takes many times as long
+  for (let k = 0; k < found.length; k++) bytes[k] = found.charCodeAt(k);
   Fclib.values[name] = new Response(
     new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")),
   ).json();

@@ -60,7 +60,7 @@
   const svgPen = (width, height, font, ink) => {
     const parts = [];
     const clean = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
-    const points = (list) => list.map((p) => p.map(round).join(",")).join(" ");
+    const points = (list) => list.map(([x, y]) => `${round(x)},${round(y)}`).join(" ");
     return {
       line: (list, { colour, width: w, dash = [] }) =>
         parts.push(

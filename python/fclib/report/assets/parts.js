@@ -149,7 +149,9 @@
   ];
 
   // ---- what was run, under a chart
-  const machine = (o) => [o.node, o.cpu].filter(Boolean).join(", ") || "an unknown machine";
+  // a published machine has the name of its processor
+  const machine = (o) =>
+    [...new Set([o.node, o.cpu])].filter(Boolean).join(", ") || "an unknown machine";
   const captionOf = (head) => `${head.caption}; ${site().judged}`;
 
   Fclib.parts = {

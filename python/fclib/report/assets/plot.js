@@ -95,8 +95,8 @@
     };
   };
 
-  /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it
-     knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
+  /* options: name, title, draw(width) -> {data, layout}, height, says: what it holds and which
+     keys it knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
      still: no tools and no table, first(width, height): a drawing that needs no library
      The box has data-shown if anything is drawn, and data-drawn if Plotly has drawn it. */
   Fclib.plot = (options) => {
@@ -118,7 +118,7 @@
     box.draw = async () => {
       const Plotly = await Fclib.plotly();
       if (!box.isConnected) return;
-      const { data, layout } = options.draw();
+      const { data, layout } = options.draw(box.clientWidth);
       if (!box.dataset.drawn) box.replaceChildren(); // without the first drawing
       await Plotly.react(
         box,
@@ -271,18 +271,12 @@
     };
     const log = (range, on) => (on ? range.map(Math.log10) : range);
     // the legend: as many columns as the longest name leaves room for
-    const width =
+    const longest = Math.max(...series.map((s) => (s.legend || s.name).length));
+    const columnsIn = (width) =>
+      Math.max(1, Math.min(series.length, Math.floor((width - 90) / (50 + 6.5 * longest))));
+    const expected =
       options.half && innerWidth > 960 ? Math.min(innerWidth, 1200) / 2 : Math.min(innerWidth, 864);
-    const columns = Math.max(
-      1,
-      Math.min(
-        series.length,
-        Math.floor(
-          (width - 90) / (50 + 6.5 * Math.max(...series.map((s) => (s.legend || s.name).length))),
-        ),
-      ),
-    );
-    const rows = Math.ceil(series.length / columns);
+    const rows = Math.ceil(series.length / columnsIn(expected));
     const few = series.length < 15;
     let place = -1;
     const read = (step) => (box) => {
@@ -315,7 +309,7 @@
           box.say("");
         },
       },
-      draw: () => ({
+      draw: (width) => ({
         data: [
           ...curves.map((s, k) => ({
             type: "scatter",
@@ -361,7 +355,11 @@
           hoverdistance: 40,
           hoversort: ylog ? "value ascending" : "value descending",
           showlegend: series.length > 1,
-          legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction", traceorder: "normal" },
+          legend: {
+            entrywidth: 0.98 / columnsIn(width),
+            entrywidthmode: "fraction",
+            traceorder: "normal",
+          },
           xaxis: {
             type: xlog ? "log" : "linear",
             range: log([low, high], xlog),

@@ -73,7 +73,14 @@
             copyable(build, "the command"),
           ]
         : !there.length
-          ? h("p", {}, "It is in no published set: who gave this report has its file.")
+          ? h(
+              "p",
+              {},
+              "This site has no file of it: who made this report has one. A file is of the same " +
+                "problem if ",
+              h("code", {}, "fclib.digest(fclib.read(FILE))"),
+              " is this:",
+            )
           : null,
       !there.length && files.length
         ? h(
@@ -121,8 +128,8 @@
     Fclib.values.site.cite.problem
       .replaceAll("{id}", () => Fclib.escaped(id))
       .replaceAll("{key}", id.replaceAll(/[^\w-]+/g, "-"))
-      .replaceAll("{version}", record.version || "of no set")
-      .replaceAll("{digest}", record.digest || "not known");
+      .replaceAll("version {version}, ", record.version ? `version ${record.version}, ` : "")
+      .replaceAll("{digest}", record.digest);
 
   /* the list of what the catalogue shows, for the commands that make or fetch it */
   Fclib.selection = (listed) => {

@@ -70,7 +70,7 @@
       ),
       ...sets
         .flatMap((set) => [
-          h("h2", {}, set || "Of no set"),
+          h("h2", {}, set || "Not in the catalogue"),
           familyCards(all.filter((f) => f.set === set)),
         ])
         .filter(Boolean),

@@ -9,27 +9,38 @@
     const shown = one.open.slice(0, most);
     const rest = one.open.length - shown.length;
     const dated = shown.some((r) => r.date);
+    const found = shown.some((r) => r.by);
     return Fclib.table({
       caption:
         `${Fclib.count(one.open.length, "open problem")} of ${one.set}` +
-        `${rest ? `, the first ${shown.length}` : ""}: the best error known, and by whom`,
+        `${rest ? `, the first ${shown.length}` : ""}` +
+        (found ? ": the best error known, and by whom" : ", of which no error is known"),
       rows: shown,
       page: 50,
       columns: [
         { key: "problem", label: "problem", head: true, cell: (r) => problemLink(r.problem) },
-        { key: "error", label: "best error", type: "number" },
-        { key: "by", label: "by", wrap: true },
+        ...(found
+          ? [
+              { key: "error", label: "best error", type: "number" },
+              { key: "by", label: "by", wrap: true, format: (v) => v || "no solver returned any" },
+            ]
+          : []),
         ...(dated ? [{ key: "date", label: "date" }] : []),
       ],
     });
   };
   const better = (one) => {
-    const problem = one.open[0].problem;
-    const steps = [
-      [`fclib collection status ${problem} --out open.hdf5`, "the problem, with the best solution"],
-      ["fclib check open.hdf5", "its error, as it will be judged"],
-      ['fclib collection take yours.hdf5 --by "you, and how"', "taken if it is better by a tenth"],
-    ];
+    const { name } = one.open.find((r) => r.by) || one.open[0];
+    const steps = one.published
+      ? [
+          [`fclib collection status ${name} --out open.hdf5`, "it, with the best solution"],
+          ["fclib check open.hdf5", "its error, as it will be judged"],
+          ['fclib collection take yours.hdf5 --by "you, and how"', "taken if better by a tenth"],
+        ]
+      : [
+          ["fclib solve --time-limit 600 --write FILE", "the solver auto, with more time"],
+          ["fclib check FILE", "the error of the stored solution, as it is judged here"],
+        ];
     const wide = Math.max(...steps.map(([command]) => command.length));
     return [
       h("p", {}, "How do you better one of them?"),
@@ -64,10 +75,8 @@
     for (const one of list) {
       page.append(h("h2", {}, one.set));
       page.append(
-        one.open.length
-          ? Fclib.openProblems(one)
-          : h("p", {}, "Each of these problems is solved by a solver."),
-        ...(one.open.length && one.published ? better(one) : []),
+        one.open.length ? Fclib.openProblems(one) : h("p", {}, "Each of these problems is solved."),
+        ...(one.open.length ? better(one) : []),
         Fclib.table({
           caption:
             `Classes of ${one.set}, by family` +

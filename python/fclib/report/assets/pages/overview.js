@@ -210,7 +210,7 @@
       }),
       h("h2", {}, "Where and what"),
       facts([
-        ["machine", `${o.node || "?"}, ${o.cpu || "?"}`],
+        ["machine", machine(o)],
         [
           "campaigns",
           o.campaigns
@@ -238,7 +238,7 @@
       h("h1", {}, s.title),
       h(
         "p",
-        { class: "small" },
+        { class: "small words" },
         `${counts.join(", ")}. ${o ? "" : "No runs were given to this report. "}`,
         link("catalogue", [], {}, "All problems"),
         " · ",

@@ -45,7 +45,7 @@
     const place = [row.k, first].find((k) => read.thumb && read.thumb(k));
     return h(
       "figure",
-      { class: "still" },
+      { class: place === undefined ? "still bare" : "still" },
       place === undefined ? null : h("img", { src: `thumbs/${place}.webp`, alt: "Its bodies" }),
       h(
         "figcaption",
@@ -81,19 +81,31 @@
     const s = site();
     const unknown = (text) => h("span", { class: "soft" }, text);
     const rank = row.rank_W ?? (view && view.spectrum ? view.spectrum.rank : undefined);
+    const isAnalysed = Number.isFinite(rank) || row.existence || row.uniqueness;
     return [
       ["contacts", number(row.nc)],
       ["degrees of freedom", row.n === null ? unknown("its bodies are not known") : number(row.n)],
       ["law", s.laws[row.formulation]],
-      ["μ", row.nc ? range([row.mu_min, row.mu_max]) : unknown("no contact")],
+      [
+        "μ",
+        row.nc
+          ? Number.isFinite(row.mu_min)
+            ? range([row.mu_min, row.mu_max])
+            : unknown("not in the stores")
+          : unknown("no contact"),
+      ],
       ["class", row.class || unknown("nothing was run")],
       ["solved by", row.solved_of || unknown("nothing was run")],
       ["rank of W", Number.isFinite(rank) ? `${rank} of ${row.rows_W}` : unknown("not analysed")],
       [
         "existence, uniqueness",
-        [row.existence || unknown("existence not proven"), "; "].concat(
-          row.uniqueness ? `velocity ${row.uniqueness}` : unknown("uniqueness not proven"),
-        ),
+        isAnalysed
+          ? [
+              row.existence || unknown("existence not proven"),
+              "; ",
+              row.uniqueness ? `velocity ${row.uniqueness}` : unknown("uniqueness not proven"),
+            ]
+          : unknown("not analysed"),
       ],
     ];
   };
@@ -191,7 +203,7 @@
     );
     page.append(...Fclib.computeIt(record, view, id, runs));
     if (runs) {
-      const several = new Set(runs.map((r) => r.form)).size > 1;
+      const several = (key) => new Set(runs.map((r) => r[key])).size > 1;
       page.append(
         h("h2", {}, "Runs"),
         Fclib.table({
@@ -202,7 +214,10 @@
           columns: [
             { key: "solver", label: "solver", head: true, cell: (r) => solverLink(r.solver) },
             { key: "tol", label: "tolerance", format: Fclib.tolerance },
-            ...(several ? [{ key: "form", label: "form" }] : []),
+            ...(several("form") ? [{ key: "form", label: "form" }] : []),
+            ...(several("repeat")
+              ? [{ key: "repeat", label: "repeat", title: "0: the problem as it is" }]
+              : []),
             { key: "status", label: "status", cell: (r) => status(r.status) },
             { key: "error", label: "error", type: "number" },
             { key: "cpu_s", label: "CPU [s]", type: "number" },

@@ -11,6 +11,7 @@
     tolerances,
     toleranceOf,
     familyChoices,
+    machine,
   } = Fclib.parts;
 
   const SET = "set:"; // before the name of a set
@@ -287,7 +288,7 @@
           `limit ${[...new Set(ends)].map((v) => Fclib.number(v)).join(" to ")} s of CPU`,
           `${failed} of ${Fclib.count(had, "run")} failed`,
           s.judged,
-          s.overview.cpu && `${s.overview.cpu} (${s.overview.node})`,
+          machine(s.overview),
           `FCLIB ${s.version}`,
         ],
         cites: [

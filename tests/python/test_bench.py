@@ -25,7 +25,6 @@ import helpers_cli
 from fclib import bench, cli
 from fclib._solve import MERITS
 from fclib.bench import problems
-from fclib.bench.campaign import parse_solver
 from fclib.bench.job import Job, Record
 from helpers import planted_global, planted_local
 
@@ -910,11 +909,12 @@ def test_solvers_that_may_be_missing() -> None:
 
 
 def test_solvers_as_texts() -> None:
-    parsed = parse_solver("nsgs relaxation=1.2 shuffle=true")
-    assert parsed == {"name": "nsgs", "options": {"relaxation": "1.2", "shuffle": "true"}}
-    assert parse_solver("cmd:./pgs {input} a=b") == {"name": "cmd:./pgs {input} a=b"}
-    plugin = parse_solver("plugin:./pgs.so step=0.5")
-    assert (plugin["name"], plugin["options"]) == ("plugin:./pgs.so", {"step": "0.5"})
+    (choice,) = campaign(solvers=["nsgs relaxation=1.2 shuffle=once"]).solvers
+    assert (choice.name, choice.options) == ("nsgs", {"relaxation": "1.2", "shuffle": "once"})
+    (choice,) = campaign(solvers=["cmd:./pgs {input} a=b"]).solvers
+    assert (choice.name, choice.options) == ("cmd:./pgs {input} a=b", {})
+    with pytest.raises(bench.CampaignError, match="'relaxation' is not of the form name=value"):
+        campaign(solvers=["nsgs relaxation"])
 
 
 def test_groups_have_limits_of_their_own() -> None:

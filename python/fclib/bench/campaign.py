@@ -11,7 +11,6 @@ import json
 import math
 import random
 import re
-import shlex
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -634,7 +633,13 @@ def _solvers(
     missing = []
     for number, row in enumerate(rows):
         where = f"solvers[{number}]."
-        entries = parse_solver(row) if isinstance(row, str) else row
+        entries: Any = row
+        if isinstance(row, str):
+            try:
+                name, options = _registry.parse_solver(row)
+            except _core.OptionError as error:
+                raise CampaignError(str(error)) from None
+            entries = {"name": name, "options": options}
         _only(entries, KNOWN_OF_SOLVER, where)
         if "name" not in entries:
             raise CampaignError(f"{where[:-1]}: has no name")
@@ -694,17 +699,3 @@ def described(info: _core.SolverInfo) -> str:
         },
         sort_keys=True,
     )
-
-
-def parse_solver(text: str) -> dict[str, Any]:
-    """A solver as one text: "nsgs relaxation=1.2"; all after "cmd:" is one name."""
-    if text.startswith("cmd:"):
-        return {"name": text}
-    name, *pairs = shlex.split(text) or [""]
-    options = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not (key and equals and value):
-            raise CampaignError(f"solver {text!r}: '{pair}' is not of the form name=value")
-        options[key] = value
-    return {"name": name, "options": options}

@@ -950,10 +950,11 @@ def caption(
             f"{counted(costs.of_other_forms, 'run')} of the other form of a problem left out"
         )
     cpu, node = first_word("cpu"), first_word("node")
-    words += [f"{cpu} ({node})" if cpu and node else cpu or node] if cpu or node else []
+    # published runs name the machine by its processor
+    words += [f"{cpu} ({node})" if cpu and node and cpu != node else cpu or node]
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
-    return "; ".join(words)
+    return "; ".join(filter(None, words))
 
 
 def loaded(rows: Iterable[Mapping[str, Any]]) -> dict[str, int]:

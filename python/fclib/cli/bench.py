@@ -17,7 +17,7 @@ import fclib
 from fclib import bench
 from fclib._verdicts import is_solved
 from fclib.bench import machine
-from fclib.bench.campaign import SET, parse_solver
+from fclib.bench.campaign import SET
 from fclib.bench.runner import RETRIES
 from fclib.bench.store import Status
 from fclib.cli._output import (
@@ -181,10 +181,9 @@ def run(
         else:
             if not problems or not solver:
                 raise bench.CampaignError("name a campaign, or give --problems and --solver")
-            rows = [parse_solver(text) for text in solver]
             groups = group_problems(problems, sample)
             chosen = bench.Campaign.of(
-                {"name": "bench", "solvers": rows, "problems": groups, **flags}
+                {"name": "bench", "solvers": list(solver), "problems": groups, **flags}
             )
         for name in retry or ():
             if name not in bench.STATUSES:

@@ -265,7 +265,12 @@ class Runner {
     std::copy_n(result.solution.r.data(), m, one.r);
     if (one.u != nullptr) std::copy_n(result.solution.u.data(), m, one.u);
     if (one.v != nullptr) std::copy_n(result.solution.v.data(), one.n, one.v);
-    answer(result.status, result.error, result.iterations);
+    Status status = result.status;
+    if (status == Status::interrupted) {  // by go_on(), which knows why
+      const int why = stopped_.load(std::memory_order_relaxed);
+      if (why >= 0) status = static_cast<Status>(why);
+    }
+    answer(status, result.error, result.iterations);
   }
 
   template <class Problem>

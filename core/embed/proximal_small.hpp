@@ -56,6 +56,8 @@ FCLIB_LANES double absolute(double x) { return x < 0 ? -x : x; }
 /// The larger one; a if a is NaN.
 FCLIB_LANES double larger(double a, double b) { return a < b ? b : a; }
 FCLIB_LANES bool is_finite(double x) { return x - x == 0; }
+/// Whether squares of numbers of this size are neither lost nor infinite.
+FCLIB_LANES bool has_square(double x) { return x >= 1e-100 && x <= 1e100; }
 
 // ---- what a caller gives and gets
 
@@ -1186,7 +1188,7 @@ class Solver {
     if (bad) sums[2] = 1;
     group.sum(sums);
     const double other = sums[1] > 0 ? sums[1] / sums[0] : 1.0;
-    double squares[2] = {0, 0};
+    double squares[4] = {0, 0, 0, 0};  // of q, of rho q, of numbers without one, entries of q
     if (mine) {
       answer_ = Answer{};
       FCLIB_UNROLL
@@ -1198,8 +1200,10 @@ class Solver {
         FCLIB_UNROLL
         for (int k = 0; k < D; ++k) {
           square += q_[o][k] * q_[o][k];
+          if (q_[o][k] != 0) squares[3] = 1;
           if (sums[3] == 0) r_[o][k] = 0;  // all contacts are open
         }
+        if (!has_square(rho_[o])) squares[2] = 1;
         squares[0] += square;
         squares[1] += rho_[o] * rho_[o] * square;
       }
@@ -1209,6 +1213,11 @@ class Solver {
       mean_ = nc > 0 ? square_root(squares[0] / nc) : 0.0;
       scale_ = squares[0] > 0 ? 1 / square_root(squares[0]) : 1.0;
       scaled_scale_ = squares[1] > 0 ? 1 / square_root(squares[1]) : 1.0;
+      // nobody knows the error, and the problem is left
+      if (squares[2] > 0 || (squares[3] > 0 && !(has_square(square_root(squares[0])) &&
+                                                 has_square(square_root(squares[1]))))) {
+        scale_ = FCLIB_INFINITY;
+      }
       kappa_ = rules.kappa;
       cautious_ = 0;
     }
@@ -1289,6 +1298,7 @@ class Solver {
     } else if (inner_ >= most_inner) {
       fail();
     }
+    if (!is_finite(scale_)) kappa_ = 0;
   }
 
   FCLIB_LANES void newton_step(bool mine) {
@@ -1449,7 +1459,7 @@ class Solver {
     system.group.sum(sums);
     gap = square_root(sums[3]) * scale_;
     // a NaN in any of them is no small error
-    if (!is_finite(sums[0] + sums[1] + sums[2])) return FCLIB_INFINITY;
+    if (!is_finite(sums[0] + sums[1] + sums[2] + scale_)) return FCLIB_INFINITY;
     const double plain = square_root(larger(sums[0], sums[2])) * scale_;
     return larger(plain, square_root(sums[1]) * scaled_scale_);
   }

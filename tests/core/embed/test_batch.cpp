@@ -482,6 +482,17 @@ TEST(Batch, StopsInTheMidstOfWhatTakesLong) {
   EXPECT_EQ(problems.status.back(), static_cast<std::int32_t>(Status::interrupted));
 }
 
+TEST(Batch, ALimitOfTimeIsNamedAlsoWithinAProblem) {
+  Problems problems(3, 32, 3, 6);
+  testing::RandomData random(5);
+  for (double& q : problems.q) q = random.vector(1)[0];
+  solve_batch(problems.batch, {.tolerance = 1e-15, .time_limit = 0.05});
+  EXPECT_EQ(problems.status.back(), static_cast<std::int32_t>(Status::time_limit));
+  for (const std::int32_t status : problems.status) {
+    EXPECT_NE(status, static_cast<std::int32_t>(Status::interrupted)) << "nobody did";
+  }
+}
+
 TEST(Batch, WhatTheFastWayDoesNotFinishGoesToAuto) {
   // W = 0 and an approach that nothing stops: there is no solution
   const std::vector<double> W(9, 0.0);

@@ -450,7 +450,7 @@ def _of_bodies(
 def _are_masses(inverse: Floats) -> npt.NDArray[np.bool_]:
     """Of each world, whether M^-1 has no negative eigenvalue."""
     if inverse.ndim == 2:
-        return np.asarray((inverse >= 0).all(axis=1))
+        return np.asarray(((inverse >= 0) & (inverse < np.inf)).all(axis=1))
     size = np.sqrt(np.abs(np.diagonal(inverse, axis1=1, axis2=2)))
     with np.errstate(invalid="ignore"):  # NaN is not good
         gap = np.abs(inverse - inverse.transpose(0, 2, 1))

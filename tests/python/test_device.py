@@ -144,7 +144,7 @@ def test_squares_that_are_lost_make_no_small_error(form: str) -> None:
             given["inverse_mass"] /= mass
             arrays = on_gpu(given if form == "bodies" else as_matrices(given))
             found = fclib.solve_batch(**arrays, unsolved="leave")
-            for k in np.flatnonzero(found.converged):
+            for k in np.flatnonzero(found.converged).tolist():
                 assert judged(given, found, k) <= 1e-8 * (1 + 1e-3)
     # zeros have no square either, and are solved
     given = bodies(2, 3, 6)

@@ -152,6 +152,19 @@ def test_squares_that_are_lost_make_no_small_error(form: str) -> None:
     assert fclib.solve_batch(**on_gpu(given), unsolved="leave").converged.all()
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_rounding_beside_large_reactions_is_no_small_error(unit: float) -> None:
+    """Masses from 1e-3 to 1e3 kg in any unit: what double precision cannot judge is left."""
+    given = bodies(2, 200, 8, seed=4)
+    scale = np.repeat(10 ** np.random.default_rng(1).uniform(-3, 3, (200, 2)), 3, axis=1)
+    given["jacobian"] *= scale[..., None]
+    given["inverse_mass"] /= unit
+    found = fclib.solve_batch(**on_gpu(as_matrices(given)), unsolved="leave")
+    assert found.converged.any()
+    for k in np.flatnonzero(found.converged).tolist():
+        assert judged(given, found, k) <= 1e-8 * (1 + 1e-3)
+
+
 def test_what_is_left_goes_to_the_cpu_or_stays() -> None:
     matrices = as_matrices(bodies(2, 4, 6))
     matrices["W"][1] = 0

@@ -1455,7 +1455,6 @@ class Solver {
       push[0] += D * length_of(x[o]) / square_root(rho_[o]);
     }
     system.group.sum(push);
-    const double unit = machine_epsilon * (D * system.nc + 40);
     double sums[4] = {0, 0, 0, 0};  // plain, impulses, velocities, gap
     double lost[2] = {0, 0};        // by rounding, as velocities and as impulses
     FCLIB_UNROLL
@@ -1473,22 +1472,23 @@ class Solver {
       for (int g = 0; g < Law::groups; ++g) limits += law_[o].limit[g];
       const double speed = square_root(square) + push[0] / square_root(rho_[o]);
       const double size = length_of(x[o]);
-      lost[0] += unit * limits * (speed + larger(size, size / rho_[o]));
-      lost[1] += unit * limits * (rho_[o] * speed + size);
+      lost[0] += limits * (speed + larger(size, size / rho_[o]));
+      lost[1] += limits * (rho_[o] * speed + size);
       sums[0] += law_[o].natural_square(u[o], x[o], 1.0, slip);
       const double scaled = law_[o].natural_square(u[o], x[o], rho_[o], slip);
       sums[1] += scaled;
       sums[2] += larger(scaled / (rho_[o] * rho_[o]), u[o][0] < 0 ? u[o][0] * u[o][0] : 0.0);
     }
-    system.group.sum(sums);
     system.group.sum(lost);
+    system.group.sum(sums);
     gap = square_root(sums[3]) * scale_;
     // a NaN in any of them is no small error
     if (!is_finite(sums[0] + sums[1] + sums[2] + scale_)) return FCLIB_INFINITY;
     const double plain = square_root(larger(sums[0], sums[2])) * scale_;
     const double error = larger(plain, square_root(sums[1]) * scaled_scale_);
     // what rounding may hide counts if the tolerance would notice
-    const double hidden = larger(lost[0] * scale_, lost[1] * scaled_scale_);
+    const double hidden =
+        machine_epsilon * (D * system.nc + 40) * larger(lost[0] * scale_, lost[1] * scaled_scale_);
     return hidden <= 1e-3 * rules.tolerance ? error : error + hidden;
   }
 

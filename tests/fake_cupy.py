@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import lapack
 
 # the words of CUDA that the kernel uses, for one thread
 HOST = r"""
@@ -109,6 +110,12 @@ def as_ours(values: Any, dtype: Any = None) -> Any:
     return np.array(values, dtype=dtype).view(ndarray)
 
 
+def unchecked_cholesky(matrices: Any) -> Any:
+    """As that of CuPy: where there is no factor, what LAPACK leaves."""
+    factors = [np.tril(lapack.dpotrf(one, lower=1)[0]) for one in matrices]
+    return np.reshape(factors, matrices.shape).view(ndarray)
+
+
 class Device:
     """The one device."""
 
@@ -125,9 +132,10 @@ class Device:
 def made() -> Any:
     """The module `cupy`."""
     module: Any = types.ModuleType("cupy")
-    for name in ("float64", "int32", "uint64", "cumsum"):
+    for name in ("float64", "int32", "uint64", "cumsum", "nan", "abs", "sqrt", "diagonal"):
         setattr(module, name, getattr(np, name))
-    for name in ("arange", "zeros", "empty", "ones", "empty_like", "matmul", "flatnonzero"):
+    for name in ("arange", "zeros", "empty", "ones", "empty_like", "matmul", "flatnonzero", "eye",
+                 "where"):  # fmt: skip
         function = getattr(np, name)
         setattr(module, name, lambda *a, _f=function, **k: _f(*a, **k).view(ndarray))
     module.ndarray = ndarray
@@ -138,7 +146,7 @@ def made() -> Any:
     module.asnumpy = lambda x: np.array(x)
     module.ascontiguousarray = lambda x, dtype=None: np.ascontiguousarray(x, dtype).view(ndarray)
     module.broadcast_to = lambda x, shape: np.broadcast_to(x, shape)
-    module.linalg = types.SimpleNamespace(cholesky=lambda x: np.linalg.cholesky(x).view(ndarray))
+    module.linalg = types.SimpleNamespace(cholesky=unchecked_cholesky)
     runtime = types.SimpleNamespace(
         getDeviceProperties=lambda _: {
             "multiProcessorCount": 1, "sharedMemPerBlockOptin": 0, "name": b"none",

@@ -154,7 +154,9 @@ class Runner {
       const std::int64_t last = std::min(first + chunk, batch_.count);
       for (std::int64_t k = first; k < last; ++k) {
         try {
-          solve_one(k, one(k, place), memory, polls, outcome);
+          if (!solve_alone(k, place, outcome)) {
+            solve_one(k, one(k, place), memory, polls, outcome);
+          }
         } catch (...) {
           fail(k, std::current_exception());
         }
@@ -196,19 +198,40 @@ class Runner {
     failed_ = k;
   }
 
+  void write(std::int64_t k, Status status, double error, std::int64_t iterations,
+             BatchOutcome& outcome) const {
+    const auto number = static_cast<std::int32_t>(status);
+    if (batch_.status != nullptr) {
+      batch_.status[k] = batch_.codes != nullptr ? batch_.codes[number] : number;
+    }
+    if (batch_.error != nullptr) batch_.error[k] = error;
+    if (batch_.iterations != nullptr) {
+      constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
+      batch_.iterations[k] = static_cast<std::int32_t>(std::min(iterations, most));
+    }
+    outcome.converged += status == Status::converged ? 1 : 0;
+  }
+
+  /// Whether problem k is one contact that needs no more than a few steps: then it is answered.
+  [[nodiscard]] bool solve_alone(std::int64_t k, const Place& place, BatchOutcome& outcome) const {
+    if constexpr (!Way::alone) {
+      return false;
+    } else {
+      if (contacts(k) != 1 || batch_.M != nullptr || batch_.starts != nullptr) return false;
+      if (stopped_.load(std::memory_order_relaxed) >= 0) return false;
+      const auto at = [&](auto* array) { return array == nullptr ? nullptr : array + place.q; };
+      const auto solved =
+          Way::solve_alone(settings_.tolerance, batch_.W + place.W, at(batch_.q),
+                           batch_.mu[place.mu], at(batch_.guess), at(batch_.r), at(batch_.u));
+      if (solved) write(k, Status::converged, solved->first, solved->second, outcome);
+      return solved.has_value();
+    }
+  }
+
   void solve_one(std::int64_t k, const One& one, Way& way, bool polls, BatchOutcome& outcome) {
     const Index m = d_ * one.nc;
     const auto answer = [&](Status status, double error, std::int64_t iterations) {
-      const auto number = static_cast<std::int32_t>(status);
-      if (batch_.status != nullptr) {
-        batch_.status[k] = batch_.codes != nullptr ? batch_.codes[number] : number;
-      }
-      if (batch_.error != nullptr) batch_.error[k] = error;
-      if (batch_.iterations != nullptr) {
-        constexpr std::int64_t most = std::numeric_limits<std::int32_t>::max();
-        batch_.iterations[k] = static_cast<std::int32_t>(std::min(iterations, most));
-      }
-      outcome.converged += status == Status::converged ? 1 : 0;
+      write(k, status, error, iterations, outcome);
     };
     if (std::string wrong = way.take(one); !wrong.empty()) {
       constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
@@ -242,7 +265,12 @@ class Runner {
     std::copy_n(result.solution.r.data(), m, one.r);
     if (one.u != nullptr) std::copy_n(result.solution.u.data(), m, one.u);
     if (one.v != nullptr) std::copy_n(result.solution.v.data(), one.n, one.v);
-    answer(result.status, result.error, result.iterations);
+    Status status = result.status;
+    if (status == Status::interrupted) {  // by go_on(), which knows why
+      const int why = stopped_.load(std::memory_order_relaxed);
+      if (why >= 0) status = static_cast<Status>(why);
+    }
+    answer(status, result.error, result.iterations);
   }
 
   template <class Problem>

@@ -121,6 +121,13 @@ class SmallWay {
     return wrong == nullptr ? std::string() : std::string("W: ") + wrong;
   }
 
+  /// One contact that needs no memory: as SmallSolver has it.
+  static constexpr bool alone = true;
+  static auto solve_alone(double tolerance, const double* W, const double* q, double mu,
+                          const double* guess, double* r, double* u) {
+    return SmallSolver<D>::solve_alone(tolerance, W, q, mu, guess, r, u);
+  }
+
   /// The merit's error of r, and u and v.
   double judge(const One& one) {
     if (one.M != nullptr) return bodies_.judge(one.mu, one.r, one.u, one.v);
@@ -167,6 +174,8 @@ class SmallWay {
 /// Rolling and spin friction: `auto` for each.
 class WholeWay {
  public:
+  static constexpr bool alone = false;
+
   std::string take(const One& one) {
     d_ = one.spacedim;
     const Index m = d_ * one.nc;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "contact/alart_curnier.hpp"
@@ -35,9 +36,20 @@ constexpr Index most_bounded = 32;
 constexpr double bounded_excess = 1e-3;
 /// Roundings of the natural map of one contact, generously.
 constexpr double roundings_of_the_map = 40;
-/// Sweeps of projections go on as long as no more of them are foreseen. They cost a half of exact
-/// ones or less, but more of them are needed, and if contacts are redundant very many.
-constexpr double most_projections = 20;
+/// Beyond these sizes squares in double precision may be lost, or be infinite.
+constexpr double smallest_size = 1e-100;
+constexpr double largest_size = 1e100;
+/// Sweeps of projections go on as long as no more of them are foreseen than cost as much as a few
+/// steps of Newton's method, within these bounds. They cost a half of exact ones or less, but more
+/// of them are needed, and if contacts are redundant very many.
+constexpr double least_projections = 20;
+constexpr double most_projections = 250;
+constexpr double few_newton_steps = 2;
+/// If a sweep changes r by less than so many tolerances, the end is near.
+constexpr double near_end = 100;
+/// A contact without others that so many steps do not solve has tangents that differ, or a normal
+/// that they change.
+constexpr int most_steps_alone = 2;
 /// A sweep solves each contact to this part of what the last sweep has changed, and of what the
 /// tolerance leaves to all.
 constexpr double closeness_to_change = 0.1;
@@ -80,10 +92,6 @@ bool eliminate(double* rows, Index n) {
   return true;
 }
 
-}  // namespace
-
-namespace {
-
 constexpr const char* not_finite = "has an entry that is not finite";
 
 bool all_finite(const double* x, std::int64_t size) {
@@ -91,6 +99,83 @@ bool all_finite(const double* x, std::int64_t size) {
   for (std::int64_t k = 0; k < size; ++k) sum += x[k] * 0.0;
   return sum == 0;
 }
+
+/// r of a contact moved against its velocity u, and put on the disk of its normal part.
+template <int D>
+inline void projected_step(double normal, double tangent, double mu, const double* u, double* r) {
+  r[0] = std::max(0.0, r[0] - normal * u[0]);
+  double square = 0;
+  for (int i = 1; i < D; ++i) {
+    r[i] -= tangent * u[i];
+    square += r[i] * r[i];
+  }
+  const double radius = mu * r[0];
+  const double scale = square > radius * radius ? radius / std::sqrt(square) : 1.0;
+  for (int i = 1; i < D; ++i) r[i] *= scale;
+}
+
+/// Whether squares of numbers of this size are safe in double precision.
+bool has_square(double size) { return size >= smallest_size && size <= largest_size; }
+
+/// Whether the error is above `aim` already, whatever is still to be added. With ||q|| = `scale`
+/// and
+/// ||rho q|| = `scaled_scale`.
+bool is_beyond(const NaturalSquares<double>& squares, double aim, double scale,
+               double scaled_scale) {
+  const double most = aim * scale;
+  const double scaled_most = aim * scaled_scale;
+  return squares.plain > most * most || squares.velocities > most * most ||
+         squares.impulses > scaled_most * scaled_most;
+}
+
+/// The merit's error in double precision, and what rounding may have done to it. Of n numbers that
+/// are added, rounding changes the sum by at most n units of the sum of their sizes. The natural
+/// map changes by no more than u^, and that by at most 1 + mu times u.
+template <int D>
+class BoundedError {
+ public:
+  using Vec = ContactVector<D>;
+
+  /// `mean` is at least the mean ||q^a||, for the slip that is rounding.
+  BoundedError(Index nc, double mean) : unit_(unit_of(nc)), mean_(mean) {}
+
+  /// A contact with the velocity u, whose terms have the sizes `terms`.
+  void add(double mu, const Vec& u, const Vec& terms, const Vec& r, double rho) {
+    const Coulomb<D> cone(mu);
+    squares_.add_plain(cone, u, r);
+    squares_.add_scaled(cone, u, r, rho);
+    const double size = r.norm();
+    const double speed = terms.norm() + mean_;
+    const double factor = unit_ * (1 + mu);
+    plain_ += factor * (speed + size);
+    velocities_ += factor * (speed + size / rho);
+    impulses_ += factor * (rho * speed + size);
+  }
+
+  [[nodiscard]] const NaturalSquares<double>& squares() const { return squares_; }
+
+  /// The error if ||q|| is `scale` and ||rho q|| is `scaled_scale`.
+  [[nodiscard]] double error(double scale, double scaled_scale) const {
+    return squares_.error(scale, scaled_scale);
+  }
+  /// A bound on it; infinity if that would be too far from the error.
+  [[nodiscard]] double bound(double error, double tolerance, double scale,
+                             double scaled_scale) const {
+    const double rounding =
+        unit_ * error + larger_error(plain_ / scale, velocities_ / scale, impulses_ / scaled_scale);
+    if (!(rounding <= bounded_excess * tolerance)) return std::numeric_limits<double>::infinity();
+    return error + rounding;
+  }
+
+  static constexpr double unit_of(Index nc) {
+    return std::numeric_limits<double>::epsilon() * (D * nc + roundings_of_the_map);
+  }
+
+ private:
+  double unit_, mean_;
+  NaturalSquares<double> squares_;
+  double plain_ = 0, velocities_ = 0, impulses_ = 0;
+};
 
 }  // namespace
 
@@ -118,7 +203,7 @@ const char* SmallSolver<D>::take(Index nc, const double* W, const double* q, con
   grow(column_, count * count);
   std::size_t at = 0;
   const auto m = static_cast<std::ptrdiff_t>(D) * nc;
-  double sum = 0;  // zero, or NaN
+  Mat sums = Mat::Zero();  // zeros, or NaN; entries apart, so that none waits for another
   for (Index a = 0; a < nc; ++a) {
     row_[static_cast<std::size_t>(a)] = at;
     for (Index b = 0; b < nc; ++b) {
@@ -129,7 +214,7 @@ const char* SmallSolver<D>::take(Index nc, const double* W, const double* q, con
         for (int j = 0; j < D; ++j) {
           const double value = from[i * m + j];
           to(i, j) = value;
-          sum += value * 0.0;
+          sums(i, j) += value * 0.0;
           empty &= value == 0;
         }
       }
@@ -137,7 +222,7 @@ const char* SmallSolver<D>::take(Index nc, const double* W, const double* q, con
       column_[at++] = b;
     }
   }
-  if (sum != 0) return not_finite;
+  if (!(sums.array() == 0).all()) return not_finite;
   row_[count] = at;
   find_islands();
   prepare(q, mu);
@@ -391,6 +476,13 @@ void SmallSolver<D>::prepare(const double* q, const double* mu) {
   }
   whole_scale_ = squares > 0 ? std::sqrt(squares) : 1;
   whole_scaled_scale_ = scaled > 0 ? std::sqrt(scaled) : 1;
+  // squares of q may be lost
+  squares_hold_ = has_square(whole_scale_) && has_square(whole_scaled_scale_) &&
+                  (squares > 0 || std::all_of(q, q + D * static_cast<std::ptrdiff_t>(nc_),
+                                              [](double x) { return x == 0; }));
+  for (Index a = 0; a < nc_ && squares_hold_; ++a) {
+    squares_hold_ = has_square(rho_[static_cast<std::size_t>(a)]);
+  }
 }
 
 template <int D>
@@ -452,20 +544,17 @@ Matrix SmallSolver<D>::matrix() const {
   return result;
 }
 
-/// A bound on the merit's error of r, in double precision, with u in u_; infinity if it would be
-/// too far from that error. It adds what rounding may have done. Of n numbers that are added,
-/// rounding changes the sum by at most n units of the sum of their sizes. The natural map changes
-/// by no more than u^, and that by at most 1 + mu times u.
 template <int D>
-double SmallSolver<D>::bounded_error(double tolerance, const double* r) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  if (D * nc_ > most_bounded) return infinity;
-  const double unit = std::numeric_limits<double>::epsilon() * (D * nc_ + roundings_of_the_map);
-  const double mean = whole_scale_;  // at least the mean ||q^a||, for the slip that is rounding
-  NaturalSquares<double> squares;
-  double plain = 0;
-  double impulses = 0;
-  double velocities = 0;
+bool SmallSolver<D>::can_bound() const {
+  return D * nc_ <= most_bounded && squares_hold_;
+}
+
+/// Whether the error of r in double precision is at most `aim`; then u is in u_. If a bound on what
+/// rounding may have done to the error meets the tolerance, it is in bound_; else that is infinity.
+template <int D>
+bool SmallSolver<D>::bound_error(double aim, const double* r) {
+  bound_ = std::numeric_limits<double>::infinity();
+  BoundedError<D> found(nc_, whole_scale_);
   for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
     Vec u = part(q_, a);
@@ -482,25 +571,96 @@ double SmallSolver<D>::bounded_error(double tolerance, const double* r) {
     add(diagonal_[self], a);
     for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) add(blocks_[k], column_[k]);
     part(u_.data(), a) = u;
-    const Coulomb<D> cone(mu_[a]);
-    const Vec ra = part(r, a);
-    const double rho = rho_[self];
-    squares.add_plain(cone, u, ra);
-    squares.add_scaled(cone, u, ra, rho);
-    const double size = ra.norm();
-    const double speed = terms.norm() + mean;
-    const double factor = unit * (1 + mu_[a]);
-    plain += factor * (speed + size);
-    velocities += factor * (speed + size / rho);
-    impulses += factor * (rho * speed + size);
+    found.add(mu_[a], u, terms, part(r, a), rho_[self]);
+    if (is_beyond(found.squares(), aim, whole_scale_, whole_scaled_scale_)) return false;
   }
-  const double error = squares.error(whole_scale_, whole_scaled_scale_);
-  const double rounding =
-      unit * error +
-      larger_error(plain / whole_scale_, velocities / whole_scale_, impulses / whole_scaled_scale_);
-  if (!(rounding <= bounded_excess * tolerance)) return infinity;
-  in_u_ = true;
-  return error + rounding;
+  const double error = found.error(whole_scale_, whole_scaled_scale_);
+  if (!(error <= aim)) return false;
+  bound_ = found.bound(error, tolerance_, whole_scale_, whole_scaled_scale_);
+  if (!(bound_ <= tolerance_)) bound_ = std::numeric_limits<double>::infinity();
+  return true;
+}
+
+/// Whether the error of the island meets the tolerance; with a bound on it if the island is all.
+template <int D>
+bool SmallSolver<D>::meets(double tolerance, const double* r) {
+  if (bounds_ && islands_ == 1) return bound_error(tolerance, r);
+  NaturalSquares<double> squares;
+  for (const Index a : now_) {
+    add_to(squares, a, r);
+    if (is_beyond(squares, tolerance, scale_, scaled_scale_)) return false;
+  }
+  return squares.error(scale_, scaled_scale_) <= tolerance;
+}
+
+/// A contact alone, by the steps of projected_sweep(). Whatever is not finite makes the bound NaN.
+template <int D>
+std::optional<std::pair<double, std::int64_t>> SmallSolver<D>::solve_alone(
+    double tolerance, const double* W, const double* q, double mu, const double* guess, double* r,
+    double* u) {
+  double sizes = 0;
+  double most = 0;
+  double square = 0;
+  double unread = 0;  // NaN if the guess is not finite
+  double own[D] = {};
+  for (int i = 0; i < D; ++i) {
+    sizes += std::abs(W[(D + 1) * i]);
+    if (i > 0) most = std::max(most, W[(D + 1) * i]);
+    square += q[i] * q[i];
+    if (guess == nullptr) continue;
+    unread += guess[i] * 0.0;
+    if (!(q[0] >= 0)) own[i] = guess[i];
+  }
+  const double mean = sizes / D;
+  const double rho = 1 / mean;
+  const double scale = std::sqrt(square);
+  if (!(W[0] > 0 && most > 0 && mu >= 0 && unread == 0)) return {};
+  if (!(has_square(scale) && has_square(rho) && has_square(rho * scale))) return {};
+  const double over = 1 / scale;
+  const double normal = 1 / W[0];
+  const double tangent = 1 / most;
+  const Coulomb<D> cone(mu);
+  constexpr double unit = BoundedError<D>::unit_of(1);
+  for (int steps = 0;; ++steps) {
+    double velocity[D];
+    double sums = 0;  // of the squares of the sizes of its terms
+    double lengths = 0;
+    for (int i = 0; i < D; ++i) {
+      velocity[i] = q[i];
+      double terms = std::abs(q[i]);
+      for (int j = 0; j < D; ++j) {
+        const double product = W[D * i + j] * own[j];
+        velocity[i] += product;
+        terms += std::abs(product);
+      }
+      sums += terms * terms;
+      lengths += own[i] * own[i];
+    }
+    if (steps > 0 || q[0] >= 0) {
+      // as BoundedError has it; as an impulse the map is no more than as a velocity
+      Vec at, by;
+      for (int i = 0; i < D; ++i) {
+        at[i] = velocity[i];
+        by[i] = own[i];
+      }
+      NaturalSquares<double> squares;
+      squares.add_plain(cone, at, by);
+      squares.add_scaled(cone, at, by, rho);
+      const double size = std::sqrt(lengths);
+      const double terms = std::sqrt(sums) + scale + std::max(size, size * mean);
+      const double error = std::sqrt(larger_error(squares.plain, squares.velocities)) * over;
+      const double rounding = unit * (error + (1 + mu) * terms * over);
+      if (rounding <= bounded_excess * tolerance && error + rounding <= tolerance) {
+        for (int i = 0; i < D; ++i) {
+          r[i] = own[i];
+          if (u != nullptr) u[i] = velocity[i];
+        }
+        return std::pair(error + rounding, std::int64_t{steps});
+      }
+    }
+    if (steps == most_steps_alone) return {};
+    projected_step<D>(normal, tangent, mu, velocity, own);
+  }
 }
 
 /// (W r + q)_a without W_aa r_a. By components: r was just stored so, and loads of vectors stall.
@@ -568,22 +728,16 @@ double SmallSolver<D>::projected_sweep(double* r) {
     const Step& step = steps_[self];
     double* const own = r + D * a;
     const Vec others = coupled(a, r);
+    double u[D];
     double next[D];
-    double square = 0;
     for (int i = 0; i < D; ++i) {
-      next[i] = others[i];
-      for (int j = 0; j < D; ++j) next[i] += block(i, j) * own[j];
+      next[i] = own[i];
+      u[i] = others[i];
+      for (int j = 0; j < D; ++j) u[i] += block(i, j) * own[j];
     }
-    next[0] = std::max(0.0, own[0] - step.normal * next[0]);
-    for (int i = 1; i < D; ++i) {
-      next[i] = own[i] - step.tangent * next[i];
-      square += next[i] * next[i];
-    }
-    const double radius = mu_[a] * next[0];
-    const double scale = square > radius * radius ? radius / std::sqrt(square) : 1.0;
+    projected_step<D>(step.normal, step.tangent, mu_[a], u, next);
     double change = 0;
     for (int i = 0; i < D; ++i) {
-      if (i > 0) next[i] *= scale;
       const double by = next[i] - own[i];
       change += by * by;
       own[i] = next[i];
@@ -595,9 +749,10 @@ double SmallSolver<D>::projected_sweep(double* r) {
   return std::max(std::sqrt(natural) / scale_, std::sqrt(scaled) / scaled_scale_);
 }
 
-/// Projected sweeps as long as few of them are foreseen. Returns whether r meets the tolerance.
+/// Projected sweeps as long as few of them are foreseen. Returns whether r meets the tolerance;
+/// `change` is that of the last one.
 template <int D>
-bool SmallSolver<D>::project(double tolerance, double* r) {
+bool SmallSolver<D>::project(double tolerance, double* r, double& change) {
   for (const Index a : now_) {
     const auto self = static_cast<std::size_t>(a);
     const Mat& block = diagonal_[self];
@@ -606,14 +761,20 @@ bool SmallSolver<D>::project(double tolerance, double* r) {
     if (!(block(0, 0) > 0) || !(most > 0)) return false;
     steps_[self] = {1 / block(0, 0), 1 / most, 1 / (rho_[self] * rho_[self])};
   }
+  // so many sweeps cost as much as a step of Newton's method, of which it takes some
+  const double step = newton_cost() / projected_cost();
+  const double worth = std::clamp(few_newton_steps * step, least_projections, most_projections);
   double last = 0;
   for (int k = 1; k <= most_sweeps; ++k) {
-    const double change = projected_sweep(r);
-    if (change <= tolerance && error(r) <= tolerance) return true;
+    change = projected_sweep(r);
+    const bool looks = k % first_sweeps == 0;
+    if (change <= (looks ? 2 : 1) * tolerance && meets(tolerance, r)) return true;
     if (!std::isfinite(change)) return false;
-    if (k % first_sweeps == 0) {
+    if (looks) {
       const double rate = std::log(last / change);
-      if (!(rate > 0) || std::log(change / tolerance) > most_projections * rate) return false;
+      const bool slow = !(rate > 0) || std::log(change / tolerance) > worth * rate;
+      // near the end a slow sweep or two say little
+      if (slow && (change > near_end * tolerance || k > 2 * step)) return false;
     }
     last = change;
   }
@@ -621,15 +782,18 @@ bool SmallSolver<D>::project(double tolerance, double* r) {
 }
 
 template <int D>
+void SmallSolver<D>::add_to(NaturalSquares<double>& squares, Index a, const double* r) const {
+  const Coulomb<D> cone(mu_[a]);
+  const Vec u = velocity(a, r);
+  const Vec ra = part(r, a);
+  squares.add_plain(cone, u, ra);
+  squares.add_scaled(cone, u, ra, rho_[static_cast<std::size_t>(a)]);
+}
+
+template <int D>
 double SmallSolver<D>::error(const double* r) const {
   NaturalSquares<double> squares;
-  for (const Index a : now_) {
-    const Coulomb<D> cone(mu_[a]);
-    const Vec u = velocity(a, r);
-    const Vec ra = part(r, a);
-    squares.add_plain(cone, u, ra);
-    squares.add_scaled(cone, u, ra, rho_[static_cast<std::size_t>(a)]);
-  }
+  for (const Index a : now_) add_to(squares, a, r);
   return squares.error(scale_, scaled_scale_);
 }
 
@@ -652,6 +816,10 @@ template <int D>
 double SmallSolver<D>::sweep_cost() const {
   const auto count = static_cast<double>(now_.size());
   return 200.0 * count + 2.0 * D * D * static_cast<double>(blocks_now_);
+}
+template <int D>
+double SmallSolver<D>::projected_cost() const {
+  return 50.0 * static_cast<double>(now_.size()) + 2.0 * D * D * static_cast<double>(blocks_now_);
 }
 template <int D>
 double SmallSolver<D>::newton_cost() const {
@@ -768,19 +936,20 @@ bool SmallSolver<D>::solve_island(std::size_t k, double tolerance, double* r) {
     return true;
   }
   if (guessed) {
-    const double start = error(r);
-    if (start <= tolerance || seek(tolerance, start, r)) return true;
+    if (meets(tolerance, r) || seek(tolerance, r)) return true;
     for (const Index a : now_) part(r, a).setZero();
   }
-  return seek(tolerance, 1.0, r);  // the error of r = 0 is about 1
+  return seek(tolerance, r);
 }
 
-/// Improves r, whose error is `start`, on the island until its error is at most the tolerance. If
-/// not, r is the best iterate.
+/// Improves r on the island until its error is at most the tolerance. If not, r is the best
+/// iterate.
 template <int D>
-bool SmallSolver<D>::seek(double tolerance, double start, double* r) {
+bool SmallSolver<D>::seek(double tolerance, double* r) {
   solvable_ = true;
-  if (project(tolerance, r)) return true;
+  double change = 1;  // about the error of r = 0
+  if (project(tolerance, r, change)) return true;
+  change = std::min(1.0, change);  // 1 if NaN
   if (contacts_.empty()) {
     for (Index a = 0; a < nc_; ++a) {
       contacts_.emplace_back(diagonal_[static_cast<std::size_t>(a)], mu_[a]);
@@ -794,7 +963,6 @@ bool SmallSolver<D>::seek(double tolerance, double start, double* r) {
   const double worth = std::min(4 * newton_cost() / sweep_cost(), most_foreseen);
   const bool alone = now_.size() == 1;
   double close = closeness * tolerance;
-  double change = std::min(start, 1.0);
   for (int k = 1; k <= most_sweeps; ++k) {
     close_ = alone ? 0.0 : close_of_error_ * std::max(close, closeness_to_change * change);
     change = sweep(r);

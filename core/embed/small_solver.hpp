@@ -15,11 +15,15 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "contact/coulomb.hpp"
 #include "contact/exact_contact.hpp"
+#include "contact/natural_squares.hpp"
 #include "embed/matrix_view.hpp"
 
 namespace fclib {
@@ -56,13 +60,17 @@ class SmallSolver {
   template <class Judge>
   double solve(double tolerance, double* r, const Judge& judge, bool exact = true) {
     double aim = tolerance;
+    tolerance_ = tolerance;
+    bounds_ = exact && can_bound();
     // an error that meets the tolerance in double precision may be a little above it
     for (int attempt = 0;; ++attempt) {
       bool met = true;
+      bound_ = std::numeric_limits<double>::infinity();
       for (std::size_t k = 0; k < islands_; ++k) met = solve_island(k, aim, r) && met;
-      if (met && exact) {
-        const double bound = bounded_error(tolerance, r);
-        if (bound <= tolerance) return bound;
+      if (met && bounds_) {
+        if (!(bound_ <= tolerance)) bound_error(tolerance, r);
+        in_u_ = bound_ <= tolerance;
+        if (in_u_) return bound_;
       }
       in_u_ = false;
       const double error = judge();
@@ -70,6 +78,15 @@ class SmallSolver {
       aim *= 0.1;
     }
   }
+
+  /// One contact, with W (D x D) by rows: r, u if it is not null, the error as `solve` has it, and
+  /// the steps. Nothing if a few steps do not solve it, or if something is not finite: then r and u
+  /// are as they were.
+  static std::optional<std::pair<double, std::int64_t>> solve_alone(double tolerance,
+                                                                    const double* W,
+                                                                    const double* q, double mu,
+                                                                    const double* guess, double* r,
+                                                                    double* u);
 
   /// Whether the last solve has left W r + q in `velocities()`, without `judge()`.
   [[nodiscard]] bool has_velocities() const { return in_u_; }
@@ -108,17 +125,21 @@ class SmallSolver {
   [[nodiscard]] Vec coupled(Index a, const double* r) const;
   [[nodiscard]] Vec velocity(Index a, const double* r) const;
   bool solve_island(std::size_t k, double tolerance, double* r);
-  bool seek(double tolerance, double start, double* r);
+  bool seek(double tolerance, double* r);
   double projected_sweep(double* r);
-  bool project(double tolerance, double* r);
+  bool project(double tolerance, double* r, double& change);
   double sweep(double* r);
+  void add_to(NaturalSquares<double>& squares, Index a, const double* r) const;
   [[nodiscard]] double error(const double* r) const;
-  double bounded_error(double tolerance, const double* r);
+  [[nodiscard]] bool can_bound() const;
+  bool bound_error(double aim, const double* r);
+  bool meets(double tolerance, const double* r);
   bool newton(int attempt, double tolerance, double* r, double& best);
   bool newton_step(double weight_of_mean, double* r);
   bool keep(double error, const double* r, double& best);
   void restore(double* r) const;
   [[nodiscard]] double sweep_cost() const;
+  [[nodiscard]] double projected_cost() const;
   [[nodiscard]] double newton_cost() const;
 
   static Eigen::Map<const Vec> part(const double* x, Index a) {
@@ -131,6 +152,10 @@ class SmallSolver {
   const double* mu_ = nullptr;
   double whole_scale_ = 1;         // ||q||
   double whole_scaled_scale_ = 1;  // ||rho q||
+  bool squares_hold_ = true;       // in double precision
+  double tolerance_ = 0;           // of the whole
+  bool bounds_ = false;            // whether a bound on the error may do
+  double bound_ = 0;               // of the last r that met the tolerance
   std::int64_t iterations_ = 0;
   // W by blocks; the diagonal ones are apart
   std::vector<Mat> diagonal_, blocks_;

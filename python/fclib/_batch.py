@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -141,7 +141,8 @@ def solve_batch(
         jacobian: (count, m, coordinates) instead of W: W = J M^-1 J^T. If ``contacts`` is given:
             (m of all problems, coordinates).
         inverse_mass: M^-1 of the jacobian's coordinates: (coordinates,) or (count, coordinates) if
-            it is diagonal, or (count, coordinates, coordinates).
+            it is diagonal, or (count, coordinates, coordinates). 0 for what is fixed; a world with
+            a negative one is invalid.
         velocity: (count, coordinates) free velocities of the bodies: q = J velocity, and what is
             given as q besides.
         spacedim: 3, or 2 for planar problems; 5 (3) with mu_r, 4 with mu_s, 6 with both.
@@ -207,8 +208,9 @@ def solve_batch(
         )
     if pattern is not None and (jacobian is not None or W is None):
         raise _core.ProblemError("pattern: is for W, given by blocks")
+    masses = np.empty(0, dtype=bool)
     if jacobian is not None:
-        W, q = _of_bodies(spacedim, jacobian, inverse_mass, velocity, q, contacts)
+        W, q, masses = _of_bodies(spacedim, jacobian, inverse_mass, velocity, q, contacts)
     sizes: tuple[int, ...]
     offsets: npt.NDArray[np.int64] | None = None
     counts: npt.NDArray[np.int32] | None = None
@@ -257,10 +259,15 @@ def solve_batch(
         "columns": columns,
         "one_pattern": pattern is not None,
     }
-    return run(
+    result = run(
         given, spacedim, count, each, counts, offsets, sizes, friction, start, None, tol, threads,
         time_limit,
     )  # fmt: skip
+    for first in np.flatnonzero(~masses)[:1]:
+        if result.wrong.startswith(f"problem {first}: W"):
+            words = "is not symmetric, or negative, or not finite"
+            result = replace(result, wrong=f"problem {first}: inverse_mass: {words}")
+    return result
 
 
 def check_options(tol: float, threads: int, time_limit: float | None) -> None:
@@ -388,8 +395,11 @@ def _blocks_of_each(
 
 def _of_bodies(
     spacedim: int, jacobian: Any, inverse_mass: Any, velocity: Any, q: Any, contacts: Any
-) -> tuple[Any, Any]:
-    """W and q of problems given by their bodies; lists of them if the numbers of contacts vary."""
+) -> tuple[Any, Any, npt.NDArray[np.bool_]]:
+    """W and q of problems given by their bodies, lists if the numbers of contacts vary.
+
+    And which masses of a world are some: of the others W is NaN.
+    """
     matrix = floats("jacobian", jacobian)
     if inverse_mass is None:
         raise _core.ProblemError("inverse_mass: is missing")
@@ -408,7 +418,7 @@ def _of_bodies(
         raise _core.ProblemError(
             f"inverse_mass: has the shape {inverse.shape}, expected one of {shapes}"
         )
-    of_each, full = inverse.ndim > 1, inverse.ndim == 3
+    of_each = inverse.ndim > 1
     moving = None if velocity is None else shaped("velocity", velocity, (count, nv))
     sizes = None if contacts is None else spacedim * np.asarray(contacts)
     rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])
@@ -419,21 +429,38 @@ def _of_bodies(
             q = shaped("q", q, matrix.shape[:2])
         else:
             q = np.split(shaped("q", flat("q", q, sizes), (len(matrix),)), np.cumsum(sizes)[:-1])
+    if not of_each:
+        inverse = np.broadcast_to(inverse, (count, nv))
+    good = _are_masses(inverse)
+    inverse = np.where(np.expand_dims(good, tuple(range(1, inverse.ndim))), inverse, np.nan)
+    if sizes is None:
+        W = _device.gram(matrix, inverse)
+        moved = 0.0 if moving is None else (matrix @ moving[..., None])[..., 0]
+        return W, moved if q is None else moved + q, good
     found = [
         _device.local(
-            one,
-            inverse[k] if of_each else inverse,
-            full,
-            None if moving is None else moving[k],
-            None if q is None else q[k],
+            one, inverse[k], None if moving is None else moving[k], None if q is None else q[k]
         )
         for k, one in enumerate(rows)
     ]
     matrices, velocities = ([one[part] for one in found] for part in range(2))
-    if sizes is None:
-        m = matrix.shape[1]
-        return np.reshape(matrices, (count, m, m)), np.reshape(velocities, (count, m))
-    return matrices, velocities
+    return matrices, velocities, good
+
+
+def _are_masses(inverse: Floats) -> npt.NDArray[np.bool_]:
+    """Of each world, whether M^-1 has no negative eigenvalue."""
+    if inverse.ndim == 2:
+        return np.asarray(((inverse >= 0) & (inverse < np.inf)).all(axis=1))
+    size = np.sqrt(np.abs(np.diagonal(inverse, axis1=1, axis2=2)))
+    with np.errstate(invalid="ignore"):  # NaN is not good
+        gap = np.abs(inverse - inverse.transpose(0, 2, 1))
+        allowed = _device.ROUNDING_OF_MASS * size[:, :, None] * size[:, None, :]
+        good = np.asarray((gap <= allowed).all(axis=(1, 2)))
+    # scaled, so that a light coordinate counts as a heavy one
+    over = np.where(np.isfinite(size) & (size > 0), 1 / np.where(size > 0, size, 1), 0)
+    scaled = np.where(good[:, None, None], inverse, 0) * over[:, :, None] * over[:, None, :]
+    least = np.linalg.eigvalsh(scaled).min(axis=1, initial=0)
+    return np.asarray(good & (least >= -_device.ROUNDING_OF_MASS))
 
 
 def floats(name: str, values: Any) -> Floats:

@@ -29,6 +29,9 @@ SHARED_COPY: Final = 8  # contacts up to which W is copied; from 16 on it is slo
 # steps that a problem may take: of those of docs/results/gpu.csv, all but one need under 100
 MOST_STEPS: Final = 400
 CUDA_DEVICE: Final = 2  # kDLCUDA of DLPack
+# how symmetric a full M^-1 must be, over the root of its diagonal entries: an inverse that was
+# computed is so up to its condition
+ROUNDING_OF_MASS: Final = 1e-9
 
 # two events of CuPy that are recorded around each kernel, for measurements; else None
 TIMER: tuple[Any, Any] | None = None
@@ -382,9 +385,25 @@ def _arrays(
         moved = cupy.matmul(matrices, arrays["velocity"][:, :, None])[:, :, 0]
         arrays["q"] = moved if arrays["q"] is None else moved + arrays["q"]
         arrays["velocity"] = None
-    arrays["matrices"] = cupy.matmul(matrices, cupy.linalg.cholesky(inverse))
+    arrays["matrices"] = cupy.matmul(matrices, _root(cupy, inverse))
     arrays["inverse"] = cupy.ones(nv)
     return arrays
+
+
+def _root(cupy: Any, inverse: DeviceArray) -> DeviceArray:
+    """L of inverse = L L^T; NaN for a world where there is none. Coordinates may be fixed.
+
+    CuPy does not say for which worlds its factors are wrong, so they are multiplied.
+    """
+    turned = inverse.transpose(0, 2, 1)
+    fixed = (inverse == 0).all(axis=2) & (turned == 0).all(axis=2)
+    unit = cupy.eye(inverse.shape[-1]) * fixed[:, :, None]
+    root = cupy.linalg.cholesky((inverse + turned) / 2 + unit) * ~fixed[:, :, None]
+    size = cupy.sqrt(cupy.abs(cupy.diagonal(inverse, axis1=1, axis2=2)))
+    allowed = ROUNDING_OF_MASS * size[:, :, None] * size[:, None, :]
+    gap = cupy.abs(cupy.matmul(root, root.transpose(0, 2, 1)) - inverse)
+    good = (gap <= allowed).all(axis=(1, 2))
+    return cupy.where(good[:, None, None], root, cupy.nan)
 
 
 def _width(cupy: Any, sizes: _Sizes, jacobian: DeviceArray) -> int:
@@ -536,11 +555,17 @@ def _on_host(
     assert inverse is not None
     row = cupy.asnumpy(inverse[k] if inverse.ndim == 2 else inverse)
     moving = part("velocity", nv * k, nv * (k + 1))
-    return *local(matrix.reshape(d * nc, nv), row, False, moving, q), mu
+    return *local(matrix.reshape(d * nc, nv), row, moving, q), mu
 
 
-def local(jacobian: Any, inverse: Any, full: bool, velocity: Any, q: Any) -> tuple[Any, Any]:
+def gram(jacobian: Any, inverse: Any) -> Any:
+    """W = J M^-1 J^T of one world, or of each; the inverse is full, or the diagonal."""
+    full = inverse.ndim == jacobian.ndim
+    halfway = jacobian @ inverse if full else jacobian * inverse[..., None, :]
+    return halfway @ np.swapaxes(jacobian, -1, -2)
+
+
+def local(jacobian: Any, inverse: Any, velocity: Any, q: Any) -> tuple[Any, Any]:
     """W and q of a problem given by its bodies."""
-    W = (jacobian @ inverse if full else jacobian * inverse) @ jacobian.T
     moved = 0.0 if velocity is None else jacobian @ velocity
-    return W, moved if q is None else moved + q
+    return gram(jacobian, inverse), moved if q is None else moved + q

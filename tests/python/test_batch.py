@@ -113,6 +113,34 @@ def test_a_bad_problem_has_its_status_and_hurts_no_other(threads: int) -> None:
     assert good.wrong == ""
 
 
+@pytest.mark.parametrize("contacts", [None, [2, 2, 2, 2, 2, 2]])
+def test_masses_that_are_none_are_invalid(contacts: list[int] | None) -> None:
+    rng = np.random.default_rng(5)
+    J, v = rng.normal(size=(6, 6, 4)), rng.normal(size=(6, 4))
+    given: dict[str, Any] = {
+        "jacobian": J if contacts is None else J.reshape(-1, 4),
+        "velocity": v, "mu": 0.5, "contacts": contacts,
+    }  # fmt: skip
+    diagonal = rng.uniform(0.5, 2, (6, 4))
+    good = fclib.solve_batch(**given, inverse_mass=diagonal)
+    assert good.converged.all()
+    diagonal[4, 1] = 0  # fixed
+    full = np.stack([np.diag(one) for one in diagonal])
+    full[1, 2, 2] = -1
+    full[2, 0, 1] = 0.3  # not symmetric
+    full[3, 0, 0] = np.inf
+    full[5, :2, :2] = [[1, 2], [2, 1]]
+    found = fclib.solve_batch(**given, inverse_mass=full)
+    names = [found.statuses[k] for k in found.status]
+    assert names == ["converged", "invalid", "invalid", "invalid", "converged", "invalid"]
+    assert found.wrong.startswith("problem 1: inverse_mass: is not symmetric, or negative")
+    assert np.allclose(found.r.reshape(6, -1)[0], good.r.reshape(6, -1)[0], atol=1e-7)
+    diagonal[3, 2] = -0.1
+    found = fclib.solve_batch(**given, inverse_mass=diagonal)
+    assert found.statuses[found.status[3]] == "invalid"
+    assert np.count_nonzero(found.converged) == 5
+
+
 def test_edges() -> None:
     none = fclib.solve_batch(np.empty((0, 6, 6)), np.empty((0, 6)), np.empty((0, 2)))
     assert len(none) == 0

@@ -119,6 +119,52 @@ def test_a_bad_problem_hurts_no_other() -> None:
     assert np.isinf(found.error[bad]).all()
 
 
+def test_a_full_inverse_mass_that_is_none_is_invalid() -> None:
+    given = bodies(2, 6, 6)
+    full = np.stack([np.diag(one) for one in given["inverse_mass"]])
+    full[1, 3, 3] = -1
+    full[2, 0, 1] = 0.3  # not symmetric
+    full[3, 4, 4] = np.nan
+    full[4, 2] = full[4, :, 2] = 0  # a coordinate that is fixed
+    full[5, :2, :2] = [[1, 2], [2, 1]]
+    found = fclib.solve_batch(**on_gpu({**given, "inverse_mass": full}))
+    names = [found.statuses[k] for k in found.status]
+    assert names == ["converged", "invalid", "invalid", "invalid", "converged", "invalid"]
+    given["inverse_mass"][4, 2] = 0
+    assert judged(given, found, 4) <= 1e-8 * (1 + 1e-3)
+
+
+@pytest.mark.parametrize("form", ["bodies", "W"])
+def test_squares_that_are_lost_make_no_small_error(form: str) -> None:
+    """1e-170^2 is 0 in double precision, and (1e160)^2 is infinite: that is for the CPU."""
+    for speed in (1e-300, 1e-170, 1e-140, 1e150):
+        for mass in (1e-160, 1.0, 1e160):
+            given = bodies(2, 3, 6)
+            given["velocity"] *= speed
+            given["inverse_mass"] /= mass
+            arrays = on_gpu(given if form == "bodies" else as_matrices(given))
+            found = fclib.solve_batch(**arrays, unsolved="leave")
+            for k in np.flatnonzero(found.converged).tolist():
+                assert judged(given, found, k) <= 1e-8 * (1 + 1e-3)
+    # zeros have no square either, and are solved
+    given = bodies(2, 3, 6)
+    given["velocity"][:] = 0
+    assert fclib.solve_batch(**on_gpu(given), unsolved="leave").converged.all()
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_rounding_beside_large_reactions_is_no_small_error(unit: float) -> None:
+    """Masses from 1e-3 to 1e3 kg in any unit: what double precision cannot judge is left."""
+    given = bodies(2, 200, 8, seed=4)
+    scale = np.repeat(10 ** np.random.default_rng(1).uniform(-3, 3, (200, 2)), 3, axis=1)
+    given["jacobian"] *= scale[..., None]
+    given["inverse_mass"] /= unit
+    found = fclib.solve_batch(**on_gpu(as_matrices(given)), unsolved="leave")
+    assert found.converged.any()
+    for k in np.flatnonzero(found.converged).tolist():
+        assert judged(given, found, k) <= 1e-8 * (1 + 1e-3)
+
+
 def test_what_is_left_goes_to_the_cpu_or_stays() -> None:
     matrices = as_matrices(bodies(2, 4, 6))
     matrices["W"][1] = 0

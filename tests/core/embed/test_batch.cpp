@@ -357,6 +357,120 @@ TEST(Batch, AnErrorInDoublePrecisionIsABound) {
   EXPECT_GT(without_judge, 200);
 }
 
+/// r, u, error and status of one contact.
+struct OneContact {
+  std::vector<double> r = {5, 5, 5}, u = {5, 5, 5};
+  double error = -1;
+  std::int32_t status = -1;
+  std::int32_t iterations = -1;
+
+  OneContact(const Eigen::Matrix3d& W, const Vector& q, double mu, const double* guess = nullptr,
+             double tolerance = 1e-8) {
+    Batch batch;
+    batch.count = 1;
+    batch.nc_each = 1;
+    batch.W = W.data();
+    batch.q = q.data();
+    batch.mu = &mu;
+    batch.guess = guess;
+    batch.r = r.data();
+    batch.u = u.data();
+    batch.error = &error;
+    batch.status = &status;
+    batch.iterations = &iterations;
+    solve_batch(batch, {.tolerance = tolerance});
+  }
+};
+
+TEST(Batch, OneContactIsJudgedAsManyAre) {
+  testing::RandomData random(3);
+  SmallSolver<3> solver;
+  int direct = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Vector size = random.vector(3).cwiseAbs() * std::pow(10.0, k % 9 - 4);
+    Eigen::Matrix3d W = Eigen::Vector3d(size[0], size[1], size[1]).asDiagonal();
+    if (k % 4 == 0) W(2, 2) = size[2];
+    if (k % 4 == 1) {
+      const Eigen::Matrix3d h = Eigen::Map<const Eigen::Matrix3d>(random.vector(9).data());
+      W = (h.transpose() * h).eval().selfadjointView<Eigen::Lower>();
+    }
+    const Vector q = random.vector(3) * std::pow(10.0, k % 7 - 3);
+    const double mu = k % 5 == 0 ? 0.0 : std::abs(random.vector(1)[0]) * std::pow(10.0, k % 3);
+    const Vector guess = random.vector(3);
+    const double tolerance = k % 2 == 0 ? 1e-8 : 1e-4;
+    const OneContact found(W, q, mu, k % 3 == 0 ? guess.data() : nullptr, tolerance);
+    ASSERT_EQ(found.status, static_cast<int>(Status::converged)) << k;
+    ASSERT_EQ(solver.take(1, W.data(), q.data(), &mu), nullptr);
+    std::vector<double> u(3);
+    const double error = solver.judge(found.r.data(), u.data());
+    EXPECT_LE(error, found.error) << k;
+    EXPECT_LE(found.error, error + 1e-3 * tolerance) << k;
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(u[i], found.u[i], 1e-12 * q.norm()) << k;
+    direct += found.iterations <= 2 ? 1 : 0;
+  }
+  EXPECT_GT(direct, 150);
+}
+
+TEST(Batch, OneContactThatIsNoneIsInvalid) {
+  const Eigen::Matrix3d W = Eigen::Matrix3d::Identity();
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (const double normal : {1.0, -1.0}) {  // it opens, or closes
+    const Vector q = Eigen::Vector3d(normal, 0.1, 0.2);
+    EXPECT_EQ(OneContact(W, q, 0.5).status, static_cast<int>(Status::converged));
+    std::vector<OneContact> bad;
+    for (const double value : {nan, infinity, -infinity}) {
+      for (int k = 0; k < 9; ++k) {
+        Eigen::Matrix3d matrix = W;
+        matrix(k / 3, k % 3) = value;
+        bad.emplace_back(matrix, q, 0.5);
+      }
+      for (int k = 0; k < 3; ++k) {
+        Vector vector = q;
+        vector[k] = value;
+        bad.emplace_back(W, vector, 0.5);
+        Vector guess = Vector::Zero(3);
+        guess[k] = value;
+        bad.emplace_back(W, q, 0.5, guess.data());
+      }
+      bad.emplace_back(W, q, value);
+    }
+    bad.emplace_back(W, q, -0.1);
+    for (std::size_t k = 0; k < bad.size(); ++k) {
+      EXPECT_EQ(bad[k].status, static_cast<int>(Status::invalid)) << k;
+      EXPECT_TRUE(std::isnan(bad[k].r[0]) && std::isnan(bad[k].u[2])) << k;
+    }
+  }
+}
+
+TEST(Batch, SquaresThatAreLostMakeNoSmallError) {
+  // 1e-170^2 is 0 in double precision, and (1e160)^2 is infinite
+  SmallSolver<3> solver;
+  for (const Index nc : {1, 2, 4}) {
+    for (const double speed : {1e-300, 1e-170, 1e-140, 1e150, 1e200}) {
+      for (const double size : {1e-200, 1e-160, 1.0, 1e160, 1e200}) {
+        const Eigen::MatrixXd W = size * Eigen::MatrixXd::Identity(3 * nc, 3 * nc);
+        const Vector q = speed * Eigen::Vector3d(-1, 0.3, 0.1).replicate(nc, 1);
+        const Vector mu = Vector::Constant(nc, 0.5);
+        std::vector<double> r(static_cast<std::size_t>(3 * nc));
+        std::int32_t status = -1;
+        Batch batch;
+        batch.count = 1;
+        batch.nc_each = nc;
+        batch.W = W.data();
+        batch.q = q.data();
+        batch.mu = mu.data();
+        batch.r = r.data();
+        batch.status = &status;
+        solve_batch(batch);
+        if (status != static_cast<int>(Status::converged)) continue;
+        ASSERT_EQ(solver.take(nc, W.data(), q.data(), mu.data()), nullptr);
+        EXPECT_LE(solver.judge(r.data(), nullptr), 1e-8) << nc << ' ' << speed << ' ' << size;
+      }
+    }
+  }
+}
+
 TEST(Batch, StopsInTheMidstOfWhatTakesLong) {
   // rank 6, and a q of any rank: most have no solution that sweeps find, and `auto` is long at each
   Problems problems(3, 32, 3, 6);
@@ -366,6 +480,17 @@ TEST(Batch, StopsInTheMidstOfWhatTakesLong) {
       solve_batch(problems.batch, {.tolerance = 1e-15, .poll = [] { return false; }});
   EXPECT_LT(outcome.by_auto, 32);
   EXPECT_EQ(problems.status.back(), static_cast<std::int32_t>(Status::interrupted));
+}
+
+TEST(Batch, ALimitOfTimeIsNamedAlsoWithinAProblem) {
+  Problems problems(3, 32, 3, 6);
+  testing::RandomData random(5);
+  for (double& q : problems.q) q = random.vector(1)[0];
+  solve_batch(problems.batch, {.tolerance = 1e-15, .time_limit = 0.05});
+  EXPECT_EQ(problems.status.back(), static_cast<std::int32_t>(Status::time_limit));
+  for (const std::int32_t status : problems.status) {
+    EXPECT_NE(status, static_cast<std::int32_t>(Status::interrupted)) << "nobody did";
+  }
 }
 
 TEST(Batch, WhatTheFastWayDoesNotFinishGoesToAuto) {

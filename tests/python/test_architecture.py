@@ -177,6 +177,7 @@ PYTHON: dict[str, set[str]] = {
     "cli": {
         "_laws",
         "_judge",
+        "_registry",
         "_regular",
         "_sequence",
         "_solve",

@@ -1,6 +1,7 @@
 #include "reduced/round.hpp"
 
 #include <utility>
+#include <vector>
 
 namespace fclib {
 
@@ -20,23 +21,62 @@ double round_coefficient(double mu, double mu_s, Eigen::Ref<Eigen::Vector3d> e) 
   return 1;
 }
 
-/// E W E, with a mean diagonal for the components that E takes away.
-Matrix scaled(const Matrix& W, const Vector& scale) {
-  constexpr Index d = 4;
-  Matrix result = converted(W, Storage::triplet);
+/// The diagonal of W~ for the components that E takes away: the mean of the contact; else 0.
+Vector own_diagonal(const Matrix& W, const Vector& scale) {
+  constexpr Eigen::Index d = 4;
   Vector diagonal = Vector::Zero(scale.size());
-  std::size_t k = 0;
-  for_each_entry(Matrix(result), [&](Index row, Index col, double value) {
+  for_each_entry(W, [&](Index row, Index col, double value) {
     if (row == col) diagonal[row] += value;
-    result.x[k++] = scale[row] * value * scale[col];
   });
-  for (Index row = 0; row < static_cast<Index>(scale.size()); ++row) {
+  Vector result = Vector::Zero(scale.size());
+  for (Eigen::Index row = 0; row < scale.size(); ++row) {
     if (scale[row] != 0) continue;
     const double mean = diagonal.segment<d>(row - row % d).mean();
+    result[row] = mean > 0 ? mean : 1;
+  }
+  return result;
+}
+
+/// E W E, with a diagonal of its own.
+Matrix scaled(const Matrix& W, const Vector& scale, const Vector& own) {
+  Matrix result = converted(W, Storage::triplet);
+  std::size_t k = 0;
+  for_each_entry(Matrix(result), [&](Index row, Index col, double value) {
+    result.x[k++] = scale[row] * value * scale[col];
+  });
+  for (Index row = 0; row < static_cast<Index>(own.size()); ++row) {
+    if (own[row] == 0) continue;
     result.i.push_back(row);
     result.p.push_back(row);
-    result.x.push_back(mean > 0 ? mean : 1);
+    result.x.push_back(own[row]);
   }
+  return result;
+}
+
+/// The bodies of W~: each component that E takes away moves a mass of its own.
+Primal scaled(const Primal& given, const Vector& scale, const Vector& own) {
+  using Entry = Eigen::Triplet<double, Index>;
+  std::vector<Entry> mass;
+  std::vector<Entry> directions;
+  auto n = static_cast<Index>(given.M.rows());
+  for (Index col = 0; col < n; ++col) {
+    for (SparseColumns::InnerIterator at(given.M, col); at; ++at) {
+      mass.emplace_back(static_cast<Index>(at.row()), col, at.value());
+    }
+  }
+  for (Index col = 0; col < static_cast<Index>(given.H.cols()); ++col) {
+    if (own[col] != 0) {
+      mass.emplace_back(n, n, 1 / own[col]);
+      directions.emplace_back(n++, col, 1.0);
+      continue;
+    }
+    for (SparseColumns::InnerIterator at(given.H, col); at; ++at) {
+      directions.emplace_back(static_cast<Index>(at.row()), col, at.value() * scale[col]);
+    }
+  }
+  Primal result{SparseColumns(n, n), SparseColumns(n, given.H.cols())};
+  result.M.setFromTriplets(mass.begin(), mass.end());
+  result.H.setFromTriplets(directions.begin(), directions.end());
   return result;
 }
 
@@ -50,7 +90,8 @@ Round::Round(const Matrix& W, const ReducedProblem& given)
     mu[a] = round_coefficient(given.friction.mu[a], given.friction.mu_s[a],
                               scale_.segment<3>(d * a + 1));
   }
-  problem_.W = BlockMatrix(scaled(W, scale_), d);
+  const Vector own = own_diagonal(W, scale_);
+  problem_.W = BlockMatrix(scaled(W, scale_, own), d);
   problem_.q = scale_.cwiseProduct(given.q);
   problem_.friction.mu = std::move(mu);
   problem_.scale = given.scale;
@@ -60,8 +101,8 @@ Round::Round(const Matrix& W, const ReducedProblem& given)
     problem_.known_r = to_own(given.known_r);
     problem_.known_u = scale_.cwiseProduct(given.known_u);
   }
-  if (given.primal != nullptr && (scale_.array() != 0).all()) {
-    primal_ = {given.primal->M, given.primal->H * scale_.asDiagonal()};
+  if (given.primal != nullptr) {
+    primal_ = scaled(*given.primal, scale_, own);
     problem_.primal = &primal_;
   }
   problem_.deadline = given.deadline;

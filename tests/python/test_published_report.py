@@ -125,6 +125,18 @@ def test_the_page_is_made_of_parts(
     with (tmp_path / "results" / "published-parts.csv").open() as file:
         (row,) = csv.DictReader(file)
     assert (row["runs"], row["read off histories"], row["problems"]) == ("84", "42", "8")
+    # a set beside it that others ran on, and did not solve
+    monkeypatch.setenv("FCLIB_CACHE", str(run / "cache"))
+    plan = {**PLAN, "name": "other", "solvers": ["nsip", "bb"], "tolerances": [1e-16]}
+    bench.run_campaign(bench.Campaign.of(plan), tmp_path / "other.sqlite")
+    with bench.Store(tmp_path / "other.sqlite") as opened:
+        results.pack(opened, tmp_path / "parts", "other", "fast")
+    published.main()
+    for name, columns in (("failures", {"stalled"}), ("kinds", {"splitting", "interior point"})):
+        with (tmp_path / "results" / f"published-{name}.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        assert columns <= rows[0].keys()
+        assert {row["set"] for row in rows} == {"faf2018", "other"}
 
 
 def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:

@@ -169,7 +169,9 @@ def of_sets(
                      "The solvers", "; ".join(caption_of(one) for one in sets) + ".")  # fmt: skip
     for one in sets:
         yield from pictures(one)
-    failures = [row for one in sets for row in failure_rows(one)]
+    statuses = sorted({row["status"] for one in sets for row in one.rows if not row["copy"]})
+    ends = [status for status in statuses if status != "unsuitable" and not is_solved(status)]
+    failures = [row for one in sets for row in failure_rows(one, ends)]
     if failures:
         yield from ("## Who fails where, and why?", "")
         yield from table("published-failures", failures, "What ends the runs that fail",
@@ -212,7 +214,10 @@ def table(name: str, rows: Sequence[Row], title: str, note: str) -> list[str]:
     """Store a table, and the line of the page that quotes it; nothing if it has no row."""
     if not rows:
         return []
-    _results.store(name, rows, title=title, note=note)
+    # sets have other families of methods, for example
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    whole = [{key: row.get(key, "") for key in columns} for row in rows]
+    _results.store(name, whole, title=title, note=note)
     return [f"[Table: {title}](results/{name}.csv)", ""]
 
 
@@ -345,7 +350,7 @@ def image(name: str, words: str) -> list[str]:
 # ---- failures and kinds
 
 
-def failure_rows(one: Set) -> list[Row]:
+def failure_rows(one: Set, statuses: Sequence[str]) -> list[Row]:
     """By tolerance and solver: what ended the runs that failed, and in which families most did."""
     ends: dict[tuple[float, str], Counter[str]] = defaultdict(Counter)
     failed: dict[tuple[float, str], Counter[str]] = defaultdict(Counter)
@@ -358,14 +363,13 @@ def failure_rows(one: Set) -> list[Row]:
         else:
             ends[own][row["status"]] += 1
             failed[own][row["family"]] += 1
-    names = sorted({name for count in ends.values() for name in count} - {"solved"})
     return [
         {
             "set": one.name,
             "tolerance": _results.power(-tol),
             "solver": solver,
             "solved": count["solved"],
-            **{name: count[name] for name in names},
+            **{name: count[name] for name in statuses},
             "families with most failures": ", ".join(
                 f"{family} {n}" for family, n in failed[tol, solver].most_common(SHOWN)
             ),

@@ -8,6 +8,7 @@
 #include "chain/stages.hpp"
 #include "contact/natural_squares.hpp"
 #include "linalg/cpu_time.hpp"
+#include "reduced/island_bodies.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/with_cone.hpp"
 
@@ -15,8 +16,9 @@ namespace fclib::chain {
 
 namespace {
 
-/// The part of a problem on these contacts.
-ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index>& contacts) {
+/// The part of a problem on these contacts. `bodies` are theirs, if they are known.
+ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index>& contacts,
+                          const Primal* bodies) {
   const int d = problem.d();
   ReducedProblem part{.W = problem.W.restricted(contacts),
                       .q = {},
@@ -26,6 +28,7 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
                       .scaled_scale = problem.scaled_scale,
                       .known_r = {},
                       .known_u = {},
+                      .primal = bodies,
                       .deadline = problem.deadline};
   const auto count = static_cast<Eigen::Index>(contacts.size());
   if (problem.rho.size() > 0) part.rho = problem.rho(contacts);
@@ -60,9 +63,7 @@ void walk(const ReducedProblem& problem, const Table& table, const Resources& re
   const auto proves = [&](const Vector& y) {
     return problem.proves_no_solution != nullptr && (*problem.proves_no_solution)(y);
   };
-  using KnownBodies = typename Island<Cone>::KnownBodies;
-  whole.emplace(problem, KnownBodies{problem.primal, {}}, table, resources, tracker, tolerance,
-                guessed, proves);
+  whole.emplace(problem, table, resources, tracker, tolerance, guessed, proves);
   whole->solve(r, On::whole);
   if (tracker.stopped()) return;
   const std::vector<Index> group = problem.W.components();
@@ -93,12 +94,16 @@ void walk(const ReducedProblem& problem, const Table& table, const Resources& re
     squared.push_back(error * error);
     sum += squared.back();
   }
+  std::optional<IslandBodies> bodies;
+  if (problem.primal != nullptr) bodies.emplace(*problem.primal);
   for (std::size_t k = 0; k < islands.size() && !tracker.stopped(); ++k) {
     const std::vector<Index>& contacts = islands[k];
     const double share =
         tolerance * std::sqrt(static_cast<double>(contacts.size()) / static_cast<double>(nc));
     if (squared[k] <= share * share) continue;
-    const ReducedProblem part = restricted(problem, contacts);
+    Primal own;
+    if (bodies) own = bodies->of(contacts, D);
+    const ReducedProblem part = restricted(problem, contacts, bodies ? &own : nullptr);
     const auto size = static_cast<Eigen::Index>(contacts.size());
     Vector x(D * size);
     for (Eigen::Index j = 0; j < size; ++j)
@@ -111,9 +116,8 @@ void walk(const ReducedProblem& problem, const Table& table, const Resources& re
       for (Eigen::Index j = 0; j < size; ++j) padded[contacts[static_cast<std::size_t>(j)]] = y[j];
       return proves(padded);
     };
-    const KnownBodies bodies{problem.primal, contacts};
     const double error =
-        Island<Cone>(part, bodies, table, resources, tracker, share, guessed, proves_island)
+        Island<Cone>(part, table, resources, tracker, share, guessed, proves_island)
             .solve(x, On::islands);
     sum += error * error;
     for (Eigen::Index j = 0; j < size; ++j)

@@ -126,11 +126,10 @@ class ConvergenceRate {
 }  // namespace
 
 template <class Cone>
-Island<Cone>::Island(const ReducedProblem& problem, const KnownBodies& bodies, const Table& table,
-                     const Resources& resources, Tracker& tracker, double tolerance, bool guessed,
+Island<Cone>::Island(const ReducedProblem& problem, const Table& table, const Resources& resources,
+                     Tracker& tracker, double tolerance, bool guessed,
                      std::function<bool(const Vector&)> proves)
     : problem_(problem),
-      bodies_(bodies),
       table_(table),
       resources_(resources),
       tracker_(tracker),
@@ -475,10 +474,8 @@ void Island<Cone>::run(const InteriorPointStage& stage) {
 template <class Cone>
 void Island<Cone>::run(const HeldBodiesStage& rules) {
   if constexpr (std::is_same_v<Cone, Coulomb<D>> && D <= 3) {
-    if (bodies_.whole == nullptr) return;
-    const bool all = bodies_.contacts.empty();
-    const Primal part = all ? Primal() : restricted(*bodies_.whole, bodies_.contacts, D);
-    HeldBodies<D> method(problem_, all ? *bodies_.whole : part, system());
+    if (problem_.primal == nullptr) return;
+    HeldBodies<D> method(problem_, *problem_.primal, system());
     ProximalPolish polish(*this, polish_below, next_polish_of_rounds);
     method.solve(
         rules, tolerance_,

@@ -25,16 +25,9 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
-  /// The bodies of the whole problem, if they are known, and which contacts of the whole the island
-  /// has. An empty list: all of them.
-  struct KnownBodies {
-    const Primal* whole = nullptr;
-    std::span<const Index> contacts;
-  };
-
   /// `proves` tells whether y (nc of the island) proves that there is no solution.
-  Island(const ReducedProblem& problem, const KnownBodies& bodies, const Table& table,
-         const Resources& resources, Tracker& tracker, double tolerance, bool guessed,
+  Island(const ReducedProblem& problem, const Table& table, const Resources& resources,
+         Tracker& tracker, double tolerance, bool guessed,
          std::function<bool(const Vector&)> proves);
 
   /// Starts from r and runs the stages for the whole or for islands. The best iterate ends in r.
@@ -93,7 +86,6 @@ class Island {
   void run(const AssociatedStage& rules);
 
   const ReducedProblem& problem_;
-  KnownBodies bodies_;
   const Table& table_;
   const Resources& resources_;
   Tracker& tracker_;

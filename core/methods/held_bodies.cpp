@@ -116,30 +116,6 @@ SparseColumns squares(const Primal& primal, double eps) {
 
 }  // namespace
 
-Primal restricted(const Primal& primal, std::span<const Index> contacts, int d) {
-  std::vector<Index> place(static_cast<std::size_t>(primal.M.rows()), -1);
-  std::vector<Index> linked;
-  const auto take = [&](Eigen::Index row) {
-    if (place[row] >= 0) return;
-    place[row] = 0;
-    linked.push_back(static_cast<Index>(row));
-  };
-  for (const Index a : contacts) {
-    for (int k = 0; k < d; ++k) {
-      for (SparseColumns::InnerIterator entry(primal.H, d * a + k); entry; ++entry) {
-        take(entry.row());
-      }
-    }
-  }
-  for (std::size_t k = 0; k < linked.size(); ++k) {
-    for (SparseColumns::InnerIterator entry(primal.M, linked[k]); entry; ++entry) take(entry.row());
-  }
-  // in their order: coordinates of one body are near each other
-  std::sort(linked.begin(), linked.end());
-  for (std::size_t k = 0; k < linked.size(); ++k) place[linked[k]] = static_cast<Index>(k);
-  return selected(primal, place, static_cast<Index>(linked.size()), contacts, d);
-}
-
 template <int D>
 HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
                           CoupledSystem& system)

@@ -50,9 +50,6 @@ struct HeldBodiesRules {
   }
 };
 
-/// The coordinates of some contacts, with all that M links to them, and these contacts.
-Primal restricted(const Primal& primal, std::span<const Index> contacts, int d);
-
 /// For problems that are known by their bodies, without bilateral constraints.
 template <int D>
 class HeldBodies {

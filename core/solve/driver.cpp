@@ -514,14 +514,23 @@ Result solve_global(const P& problem, const P& given, const Request& request,
     if (error <= request.settings.tolerance) return error;
     Solution other = first ? std::move(expanded) : held();
     const double other_error = judge_complete(other);
-    if (!(other_error < error)) return error;
+    if (!(other_error <= request.settings.tolerance)) return error;
     solution = std::move(other);
     return other_error;
   };
-  return agreeing(
-      problem,
-      run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded, prove),
-      elimination, request.settings.tolerance);
+  Result result =
+      run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded, prove);
+  // what misses the tolerance holds its joints too; corrections are of what conversions give
+  if (!(result.error <= request.settings.tolerance)) {
+    Solution other = result.solution;
+    elimination.hold(problem, condensation, other);
+    const double error = judge_complete(other);
+    if (error < result.error) {
+      result.error = error;
+      result.solution = std::move(other);
+    }
+  }
+  return agreeing(problem, std::move(result), elimination, request.settings.tolerance);
 }
 
 /// Makes the joints agree if they contradict each other only by rounding, then solves.

@@ -949,9 +949,8 @@ def caption(
         words.append(
             f"{counted(costs.of_other_forms, 'run')} of the other form of a problem left out"
         )
-    cpu, node = first_word("cpu"), first_word("node")
     # published runs name the machine by its processor
-    words += [f"{cpu} ({node})" if cpu and node and cpu != node else cpu or node]
+    words.append(", ".join(dict.fromkeys(filter(None, map(first_word, ("node", "cpu"))))))
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
     return "; ".join(filter(None, words))

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <span>
 
 #include "chain/table.hpp"
 #include "chain/tracker.hpp"

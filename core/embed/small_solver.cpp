@@ -117,9 +117,8 @@ inline void projected_step(double normal, double tangent, double mu, const doubl
 /// Whether squares of numbers of this size are safe in double precision.
 bool has_square(double size) { return size >= smallest_size && size <= largest_size; }
 
-/// Whether the error is above `aim` already, whatever is still to be added. With ||q|| = `scale`
-/// and
-/// ||rho q|| = `scaled_scale`.
+/// Whether the error is above `aim` already, whatever is still to be added. ||q|| is `scale`, and
+/// ||rho q|| is `scaled_scale`.
 bool is_beyond(const NaturalSquares<double>& squares, double aim, double scale,
                double scaled_scale) {
   const double most = aim * scale;

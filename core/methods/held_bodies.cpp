@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 #include "linalg/groups.hpp"
 #include "methods/interior_point.hpp"

@@ -24,7 +24,6 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <tuple>
 #include <vector>
 

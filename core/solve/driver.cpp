@@ -416,9 +416,6 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
       elimination, request.settings.tolerance);
 }
 
-/// A guess is judged if its natural map in plain arithmetic is at most so many tolerances.
-constexpr double promising = 2;
-
 /// ||r - P_K(r - u^)||^2 in plain arithmetic.
 double natural_squares(Index d, const Friction& friction, const Vector& u, const Vector& r) {
   double sum = 0;
@@ -451,7 +448,7 @@ std::optional<Result> known_solution(const P& problem, const Friction& friction,
   Vector q = problem.w;
   multiply_transposed_add(problem.H, mass.solve(problem.f), q);
   const double error = std::sqrt(natural_squares(d, friction, solution.u, solution.r));
-  if (!(error <= promising * settings.tolerance * q.stableNorm())) return {};
+  if (!(error <= settings.tolerance * q.stableNorm())) return {};
   const OwnSizes own = own_sizes(problem, mass);
   // if only rounding is left of q, the solution is r = 0
   if (!(q.stableNorm() > static_cast<double>(own.rounding.norm()))) return {};

@@ -16,6 +16,7 @@ import types
 import typing
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -294,10 +295,13 @@ def find_solver(name: str) -> _core.SolverInfo:
 def parse_solver(text: str) -> tuple[str, dict[str, str]]:
     """The name and the options of "nsgs relaxation=1.2"; all after "cmd:" is one name.
 
+    So is the name of a registered solver, or the path of a plugin, that has spaces.
+
     Raises:
         OptionError: an option is not of the form name=value.
     """
-    if text.startswith("cmd:"):
+    plugin = text.startswith("plugin:") and Path(text.removeprefix("plugin:")).is_file()
+    if text.startswith("cmd:") or text in _registered or plugin:
         return text, {}
     try:
         name, *pairs = shlex.split(text) or [""]

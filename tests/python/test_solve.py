@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import scipy.sparse as sp
 
 import fclib
 from ball_judge import judge
+from fclib import _registry
 from helpers import STORAGES, dense, local_problem, planted_global, planted_local
 
 
@@ -449,6 +451,19 @@ def test_contradicting_bilateral_constraints_are_unsuitable() -> None:
 
 
 # ---- options
+
+
+def test_a_name_with_spaces_is_a_name(tmp_path: Path) -> None:
+    """Of a registered solver, and of a plugin; what is no name has options behind it."""
+    plugin = tmp_path / "my plugin.so"
+    plugin.touch()
+    assert _registry.parse_solver(f"plugin:{plugin}") == (f"plugin:{plugin}", {})
+    assert _registry.parse_solver("plugin:a.so step=0.5") == ("plugin:a.so", {"step": "0.5"})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(_registry._registered, "my solver", fclib.find_solver("nsgs"))
+        assert _registry.parse_solver("my solver") == ("my solver", {})
+    with pytest.raises(fclib.OptionError, match="'solver' is not of the form"):
+        _registry.parse_solver("my solver")
 
 
 @pytest.mark.parametrize(

@@ -112,6 +112,7 @@ def runner(
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
+        from distributed.comm import CommClosedError
         from distributed.scheduler import KilledWorker
 
         waiting: dict[Any, Job] = {}
@@ -188,8 +189,9 @@ def runner(
                 progress = True
                 yield job, record
         except (CancelledError, OSError, TimeoutError, RuntimeError) as error:
-            # if the scheduler is gone, so are all its tasks
-            if isinstance(error, _core.Error) or client.status == "running":
+            # if the scheduler is gone, so are all its tasks; its client may not know it yet
+            closed = isinstance(error, CommClosedError)
+            if isinstance(error, _core.Error) or (client.status == "running" and not closed):
                 raise
             raise _core.Error(
                 f"{address}: the Dask scheduler has ended or does not answer; the runs that were"

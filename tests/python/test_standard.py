@@ -1,6 +1,8 @@
 """The set `standard`: how it is chosen, and how its problems stand."""
 
 import json
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ pytest.importorskip("pyarrow")
 
 from fclib import collections
 from fclib.collections import published, ratings, set_index, trajectory
-from workshop.sets import features
+from workshop.sets import choose, features
 
 load: Any = fclib.load
 there = pytest.mark.skipif(
@@ -291,54 +293,87 @@ def test_part_of_a_trajectory_is_some_of_its_problems(tmp_path: Path) -> None:
 # ---- lists of earlier versions
 
 
-@there
-def test_problems_of_an_older_list_are_named_with_their_version(tmp_path: Path) -> None:
+@pytest.fixture
+def grown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A set in two versions: the older one has other problems of a family, and one that stays.
+
+    The present files of the families do not take the parameters of its scenes.
+    """
+    towers = published.path_of("rt444/KaplasTower", "1")
+    packing = published.path_of("robots/Gripper", "1")
+    if towers is None or packing is None:
+        pytest.skip("the package of trajectories is not here")
+    package, data = tmp_path / "package", tmp_path / "data"
+    (data / set_index.OLDER).mkdir(parents=True)
+    numbers: dict[tuple[str, str], list[int]] = {
+        ("KaplasTower", "1"): [7, 150],
+        ("KaplasTower", "2"): [9, 150],
+        ("Gripper", "1"): [0, 3],
+    }
+    lists: dict[str, list[set_index.Choice]] = {"1": [], "2": []}
+    for (family, version), own in numbers.items():
+        states = trajectory.read(towers if family == "KaplasTower" else packing)
+        part = trajectory.part(states, own, "hard", version)
+        scene = replace(part.scene, parameters={**part.scene.parameters, "of_old": 1.0})
+        path = package / published.FOLDER / "hard" / f"{family}-{version}{trajectory.SUFFIX}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trajectory.write(path, replace(part, scene=scene))
+        for version_ in ("1", "2") if family == "Gripper" else (version,):
+            lists[version_] += [
+                set_index.Choice(family, scene.parameters, scene.seed or 0, n, n, digest)
+                for n, digest in zip(own, part.digest, strict=True)
+            ]
+    choose.write_list(data / set_index.OLDER / "hard-1.json", lists["1"], {})
+    choose.write_list(data / "hard.json", lists["2"], {})
+    monkeypatch.setattr(published, "IN_PLACE", package)
+    monkeypatch.setattr(set_index, "DATA", data)
+    monkeypatch.setitem(set_index.SETS, "hard", ("2", "what few solvers solve"))
+    set_index.choices.cache_clear()
+    yield
+    set_index.choices.cache_clear()
+
+
+def test_a_version_of_a_set_has_families_that_did_not_change(grown: None) -> None:
+    """The present one has all families, each by its newest states; an older one has its own."""
+    assert set_index.folders(["hard"], "2") == set_index.folders(["hard"])
+    assert sorted(set_index.folders(["hard"])) == ["hard/Gripper", "hard/KaplasTower"]
+    for version, towers in (("1", [7, 150]), ("2", [9, 150])):
+        found = {
+            (folder.partition("/")[2], int(number)): digest
+            for folder in set_index.folders(["hard"], version)
+            for plan in [set_index.plan_of(folder, version=version)]
+            for number, digest in published.digests(folder, plan.version).items()
+            if number in plan.numbers()
+        }
+        assert found == {(c.family, c.number): c.digest for c in set_index.listed("hard", version)}
+        assert set_index.plan_of("hard/KaplasTower", version=version).numbers().tolist() == towers
+    assert set_index.plan_of("hard/Gripper", version="2").version == "1"
+    with pytest.raises(collections.VersionError, match="version 99 is not stored here"):
+        set_index.plan_of("hard/KaplasTower", version="99")
+
+
+def test_problems_of_an_older_list_are_named_with_their_version(
+    grown: None, tmp_path: Path
+) -> None:
     pytest.importorskip("mujoco")
-    old = set_index.folders(["hard"], "6")
-    now = {f"hard/{choice.family}/{choice.number:04d}" for choice in set_index.choices("hard")}
-    names = [f"{own}/{number:04d}" for own in old for number in published.digests(own, "6")]
-    gone = next(name for name in names if name.startswith("hard/PlanarBlocks") and name not in now)
-    with pytest.raises(collections.VersionError, match=r"version 6 had: .* hard --version 6"):
-        load(gone, folder=tmp_path)
-    folder, _, number = gone.rpartition("/")
-    plan = collections.plan_of(folder, version="6", references=False)
+    with pytest.raises(collections.VersionError, match=r"version 1 had: .* hard --version 1"):
+        load("hard/KaplasTower/0007", folder=tmp_path)
+    plan = collections.plan_of("hard/KaplasTower", version="1", references=False)
     collections.build([plan], tmp_path, pictures=False)
     rows = collections.read_catalog(tmp_path).to_pylist()
-    assert [row["number"] for row in rows] == sorted(published.digests(folder, "6"))
+    assert [row["number"] for row in rows] == [7, 150]
     assert {set_index.origin_of(row) for row in rows} == {"published"}
-    assert int(number) in [row["number"] for row in rows]
 
 
-@there
-def test_a_version_of_a_set_has_families_that_did_not_change() -> None:
-    """The present one has all families, each by its newest states; an older one has its own."""
-    newest, older = set_index.folders(["standard"], set_index.version("standard")), {}
-    assert newest == set_index.folders(["standard"])
-    for folder in newest:
-        plan = set_index.plan_of(folder, version=set_index.version("standard"))
-        assert plan.version == set_index.version_of(folder)
-        assert plan.numbers().tolist() == set_index.plan_of(folder).numbers().tolist()
-        if "1" in published.versions(folder):
-            older[folder] = set_index.plan_of(folder, version="1")
-    assert set_index.folders(["standard"], "1") == sorted(older)
-    assert older["standard/Arch"].trajectory == set_index.plan_of("standard/Arch").trajectory
-    before, now = older["standard/Chute"], set_index.plan_of("standard/Chute")
-    assert before.trajectory != now.trajectory
-    assert before.numbers().tolist() == now.numbers().tolist()
-    with pytest.raises(collections.VersionError, match="version 99 is not stored here"):
-        set_index.plan_of("standard/Arch", version="99")
-
-
-@there
-def test_version_8_of_hard_is_whole() -> None:
-    """Families that did not change since have their older states."""
-    found = {
-        (folder.partition("/")[2], number): digest
-        for folder in set_index.folders(["hard"], "8")
-        for plan in [set_index.plan_of(folder, version="8")]
-        for number, digest in (
-            published.digests(folder, plan.version) or ratings.digests(folder)
-        ).items()
-        if number in plan.numbers()
-    }
-    assert found == {(c.family, c.number): c.digest for c in set_index.listed("hard", "8")}
+def test_a_list_is_built_from_scenes_that_its_families_no_longer_make(
+    grown: None, tmp_path: Path
+) -> None:
+    pytest.importorskip("mujoco")
+    plan = collections.plan_of("hard/KaplasTower", references=False)
+    assert plan.scene.parameters["of_old"] == 1.0
+    collections.build([plan], tmp_path, pictures=False)
+    rows = collections.read_catalog(tmp_path).to_pylist()
+    assert [(row["number"], set_index.origin_of(row)) for row in rows] == [
+        (9, "published"),
+        (150, "published"),
+    ]

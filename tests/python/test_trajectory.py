@@ -436,25 +436,9 @@ RANGES: dict[str, Any] = {
 }
 # penetration of stored states, of the diameter of the smallest body
 DEEPEST = 0.02
-# that of older versions, in which fast grains that strike are deeper
+# that of states which another engine handed over
 HANDED = 0.2
 LARGE = 5_000  # coordinates
-DEEPER = {
-    "Chute": 0.1,
-    "DiscFlow": 0.1,
-    "Humanoid": 0.025,
-    "PrimitiveSoup": 0.04,
-    "RollingChute": 0.1,
-    "RollingDiscs": 0.08,
-    "RollingSoup": 0.07,
-    "RollingSpheres": 0.2,
-    "Silo": 0.06,
-    "Spheres": 0.09,
-    "SpheresInABox": 0.06,
-    "SpinningBodies": 0.03,
-    "Chute1000": 0.4,
-    "Chute4000": 0.5,
-}
 with collection_table.PUBLISHED.open(newline="") as file:
     SIZES = {
         row["ours"].split()[0]: row
@@ -545,7 +529,7 @@ def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any
     newest = collections.plan_of(folder)
     if newest.version == version:
         assert states.number.tolist() == newest.numbers().tolist()
-    bound = deepest(name, states)
+    bound = deepest(states)
     last = len(states) - 1
     # a large mesh takes seconds
     for place in {last} if states.position.shape[1] > LARGE else {0, last // 2, last}:
@@ -561,7 +545,7 @@ def test_depths_and_sizes_of_all_that_is_published(stored: tuple[str, Path, Any]
     name, _, states = stored
     folder, _, version = name.removesuffix(trajectory.SUFFIX).rpartition("-")
     row = SIZES.get(folder) if collections.plan_of(folder).version == version else None
-    bound = deepest(name, states)
+    bound = deepest(states)
     sizes = []
     some = set(np.linspace(0, len(states) - 1, 20).astype(int).tolist())
     for place in range(len(states)) if row else sorted(some):
@@ -599,9 +583,8 @@ def check_digest(folder: str, states: Any, place: int, problem: Any) -> None:
         assert fclib.digest(problem) == states.digest[place]
 
 
-def deepest(name: str, states: Any) -> float:
+def deepest(states: Any) -> float:
     """How deep bodies may be in each other [m]."""
-    folder = name.rpartition("-")[0]
     if states.scene.interactions:
         return float("inf")  # the laws of a deck keep penetrations
     if states.handed is not None:
@@ -612,8 +595,6 @@ def deepest(name: str, states: Any) -> float:
         size = 0.5 * min(min(block.size) for block in states.scene.solids.blocks)
     # Siconos pushes no bodies apart: how deep an impact has left them they stay
     bound = DEEPEST if states.handed is None else HANDED
-    if name != PRESENT.get(folder) and not folder.startswith("rr9118/"):
-        bound = DEEPER.get(states.scene.name, DEEPEST)
     return float(bound * 2 * size)
 
 

@@ -42,8 +42,9 @@ def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -
     rows = []
     for choice in choices:
         row = asdict(choice)
-        unsaid = [name for name in ("scene", "since") if not row[name]]
-        rows.append(json.dumps({k: v for k, v in row.items() if k not in unsaid}, sort_keys=True))
+        if not row["scene"]:
+            del row["scene"]
+        rows.append(json.dumps(row, sort_keys=True))
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
     catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))

@@ -559,15 +559,15 @@ def choices_of(sources: Mapping[str, Candidates], rows: Sequence[Row]) -> list[C
     for row in rows:
         found, number = sources[folder_of(row)], int(row["number"])
         scene = found.plan.scene
-        step = number
+        step, digest = number, row["digest"]
         if found.states is not None:
-            step = int(found.states.step[found.states.index(number)])
+            place = found.states.index(number)
+            # on another machine the problem may differ from the published one by rounding
+            step, digest = int(found.states.step[place]), found.states.digest[place]
         label = str(row["label"])
         other = "" if label == scene.name else scene.name
         parameters = dict(scene.parameters)
-        chosen.append(
-            Choice(label, parameters, scene.seed or 0, number, step, row["digest"], other)
-        )
+        chosen.append(Choice(label, parameters, scene.seed or 0, number, step, digest, other))
     return sorted(chosen, key=lambda choice: (choice.family, choice.number))
 
 

@@ -8,8 +8,7 @@ standard, hard, tiny, rr9118, fclib2024     chosen problems, in folders of their
                                             lists
 
 A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
-stored, its problems never change (`published.py`). A list that has grown notes the version in which
-each problem came. A list that was replaced stays in data/older.
+stored, its problems never change (`published.py`). A list that was replaced stays in data/older.
 """
 
 from __future__ import annotations
@@ -33,32 +32,32 @@ SHIPPED = ("tiny",)  # sets whose problems need no build
 # name, version, description; a set that a family names and that is missing here has version 1
 SETS: dict[str, tuple[str, str]] = {
     "rt444": ("1", "the four families of RT-0444; three of the scenes in Siconos"),
-    "granular": ("7", "grains that fall, flow and are pressed"),
-    "rolling": ("6", "grains with rolling friction"),
-    "masonry": ("5", "blocks laid without mortar"),
-    "deformable": ("2", "elastic bodies, meshes of finite elements"),
-    "mixed": ("7", "mechanisms and robots, with bilateral constraints"),
-    "planar": ("6", "bodies in a plane"),
-    "local": ("2", "problems of one contact"),
-    "impacts": ("3", "bodies that strike and bounce, restitution 0 to 1"),
-    "existence": ("3", "without a solution, or with several, and known to be so"),
+    "granular": ("1", "grains that fall, flow and are pressed"),
+    "rolling": ("1", "grains with rolling friction"),
+    "masonry": ("1", "blocks laid without mortar"),
+    "deformable": ("1", "elastic bodies, meshes of finite elements"),
+    "mixed": ("1", "mechanisms and robots, with bilateral constraints"),
+    "planar": ("1", "bodies in a plane"),
+    "local": ("1", "problems of one contact"),
+    "impacts": ("1", "bodies that strike and bounce, restitution 0 to 1"),
+    "existence": ("1", "without a solution, or with several, and known to be so"),
     "spin": ("1", "contacts that resist spin: grasping, turning, screws"),
-    "dynamics": ("3", "silo, rope, spinning bodies, friction that differs by contact"),
-    "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
-    "machines": ("2", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "dynamics": ("1", "silo, rope, spinning bodies, friction that differs by contact"),
+    "robots": ("1", "a gripper that lifts, an arm that pushes a pile"),
+    "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
     "quasistatic": ("1", "without inertia: M is a stiffness, of rubber, or of soil that yields"),
     "laws": ("1", "cohesion, compliance, friction by ellipses, as Coulomb's problem"),
     "assembly": ("1", "pins in holes, a cable around a drum"),
     "flows": ("1", "a granular flow of up to 100,000 contacts"),
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
     "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
-    "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
+    "rr9118": ("1", "families in the regimes of the sets published with RR-9118"),
     "fclib2024": ("1", "families in the sizes of the library's sets of 2024"),
-    "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("17", "all families that came after RT-0444"),
-    "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
-    "hard": ("9", "what most solvers fail on, of standard and of the later sets"),
-    "tiny": ("6", "one problem of each kind; comes with the package"),
+    "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
+    "extended": ("1", "all families that came after RT-0444"),
+    "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
+    "hard": ("1", "what most solvers fail on, of standard and of the later sets"),
+    "tiny": ("1", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
@@ -78,7 +77,6 @@ class Choice:
     step: int  # step of the simulation
     digest: str  # `fclib.digest`; empty if not known yet
     scene: str = ""  # the scene's own name, if the list calls the family otherwise
-    since: str = ""  # version of the list in which it came, if the list has grown
 
     @classmethod
     def read(cls, path: Path) -> tuple[Choice, ...]:
@@ -98,15 +96,8 @@ def listed(name: str, version_: str) -> list[Choice]:
     """The problems of a list in one of its versions; empty if the list does not know them."""
     if version_ == version(name):
         return list(choices(name))
-    if not (version_ or "").isdecimal():
-        return []
-    # of a list that has grown, the next one tells
-    there = {int(path.stem.rpartition("-")[2]): path for path in older_lists(name)}
-    later = min((one for one in there if one >= int(version_)), default=None)
-    found = choices(name) if later is None else Choice.read(there[later])
-    if later == int(version_):
-        return list(found)
-    return [c for c in found if c.since and int(c.since) <= int(version_)]
+    path = DATA / OLDER / f"{name}-{version_}.json"
+    return list(Choice.read(path)) if path in older_lists(name) else []
 
 
 def older_lists(name: str) -> list[Path]:
@@ -285,17 +276,18 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
             f"{folder}: version {version} is not stored here (stored: {there}); a release of"
             " fclib-collection that has it builds it"
         )
-    plan = fresh_plan(folder, seed, **{"version": wanted, **settings})
-    if stored is not None:
-        frozen, _ = trajectory.read_origin(stored)
-        now = any(choice.family == family for choice in choices(plan.collection))
-        if choices(plan.collection) and (wanted != version_of(folder) or not now):
-            # the list had other problems then
-            numbers = tuple(published.digests(folder, wanted))
-            own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
-            return replace(plan, scene=frozen, trajectory=stored, **own)
-        if frozen.seed == plan.scene.seed:
-            return stored_part(replace(plan, scene=frozen, trajectory=stored))
+    frozen = trajectory.read_origin(stored)[0] if stored is not None else None
+    plan = _plan(folder, seed, frozen, **{"version": wanted, **settings})
+    if stored is None or frozen is None:
+        return plan
+    now = any(choice.family == family for choice in choices(plan.collection))
+    if choices(plan.collection) and (wanted != version_of(folder) or not now):
+        # the list had other problems then
+        numbers = tuple(published.digests(folder, wanted))
+        own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
+        return replace(plan, scene=frozen, trajectory=stored, **own)
+    if frozen.seed == plan.scene.seed:
+        return stored_part(replace(plan, scene=frozen, trajectory=stored))
     return plan
 
 
@@ -317,6 +309,14 @@ def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
     Raises:
         ValueError: as `plan_of` raises it.
     """
+    return _plan(folder, seed, None, **settings)
+
+
+def _plan(folder: str, seed: int, frozen: scenes.Scene | None, **settings: Any) -> Plan:
+    """The plan of a folder; problems of a list keep their seed, and the scene that was stored.
+
+    The present file of a family need not take the parameters of that scene.
+    """
     name, family = folder.split("/")
     settings = {"collection": name, "version": version_of(folder), **settings}
     had = listed(name, settings["version"]) or choices(name)
@@ -328,8 +328,9 @@ def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
         raise ValueError(f"{folder}: the list {name}.json has two scenes of one name")
     numbers = tuple(sorted({choice.number for choice in own}))
     settings = {"chosen": numbers, "problems": numbers[-1] + 1, "label": family, **settings}
-    scene = source(first.scene or family, dict(first.parameters), first.seed)
-    return Plan(scene=scene, **settings)
+    if frozen is not None and frozen.seed == first.seed:
+        return Plan(scene=frozen, **settings)
+    return Plan(scene=source(first.scene or family, dict(first.parameters), first.seed), **settings)
 
 
 def from_folder(plan: Plan, folder: str | Path) -> Plan:

@@ -496,11 +496,10 @@ def test_a_file_is_drawn_where_python_draws_it(page: Any, tmp_path: Path) -> Non
     from fclib.collections import set_index, trajectory
 
     problems: dict[str, Any] = {}
-    for family in ("Chute", "Carrier", "Humanoid", "PeriodicBox"):
-        plan = set_index.plan_of(f"standard/{family}")
-        assert plan is not None
+    for family in ("machines/GearTrain", "fclib2024/PrimitiveSoup", "rr9118/PeriodicBox"):
+        plan = set_index.plan_of(family)
         assert plan.trajectory is not None
-        problems[family] = trajectory.read(plan.trajectory).problem(0).problem
+        problems[family.partition("/")[2]] = trajectory.read(plan.trajectory).problem(0).problem
     kinds = set()
     for name, problem in problems.items():
         path = tmp_path / f"{name}.hdf5"

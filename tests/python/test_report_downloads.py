@@ -22,7 +22,7 @@ from helpers_report import read_data, skip_without_libraries
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 skip_without_libraries()
-NAME = "standard/SliderCrank"
+NAME = "standard/Walker"  # of a set that is a list
 read: Any = fclib.read
 
 

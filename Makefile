@@ -7,7 +7,8 @@ BUILD := build
 SECONDS := 60
 BUDGET ?= 10min
 CAMPAIGNS ?= rt444 scaling faf2018
-JOBS ?= auto
+# processes of tests: one more than cores, since some tests wait
+JOBS ?= $(shell echo $$(( $$(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1 )))
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
@@ -29,7 +30,7 @@ NO_NPM := @echo "== there is no npm: JavaScript is not checked (apt-get install 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
-	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
+	@echo "make test    set up, then run all tests on all cores (JOBS=2: in two processes)"
 	@echo "make test-long  the tests of a minute or more, which make test leaves out"
 	@echo "make wasm    the core as a module for browsers, into $(BUILD)/wasm/fclib (needs Emscripten)"
 	@echo "make docs    set up, then build the documentation into $(BUILD)/site (REPORT=ADDRESS: links to a report;"

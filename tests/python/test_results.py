@@ -269,3 +269,14 @@ def test_rows_must_have_the_same_columns(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(ValueError, match="has no row"):
         _results.store("t", [], title="T")
     assert not list(tmp_path.iterdir())
+
+
+def test_constants_that_are_varied_stand_in_their_sources() -> None:
+    """Each once, with the value that the first row of its table has."""
+    pytest.importorskip("flint")
+    from workshop.tuning import constants
+
+    for one in constants.CONSTANTS:
+        text = (ROOT / "core" / one.source).read_text(encoding="utf-8")
+        found = re.findall(constants.pattern(one.name), text)
+        assert [value for _, value in found] == [one.values[0]], one.name

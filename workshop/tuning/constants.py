@@ -14,10 +14,11 @@ other pages have larger numbers):
     no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
     jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
     crowded     the FILEs of the families to choose on that come to this stage: most bodies move
+    batches     boxes of 1 to 64 contacts, in batches, cold and warm, to four tolerances
 
 A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
-times; of digits the least of three runs. A FILE or a packing has a limit of --seconds of CPU, as
-much as a failure counts.
+times; of digits the least of three runs, of batches of more. A FILE or a packing has a limit of
+--seconds of CPU, as much as a failure counts.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ if OWN in sys.argv:
 import numpy as np  # noqa: E402
 
 import fclib  # noqa: E402
-from workshop.tables import _results  # noqa: E402
+from workshop.tables import _results, small_scenes  # noqa: E402
 from workshop.tuning import choose_auto  # noqa: E402
 
 sys.path.append(str(ROOT / "tests"))
@@ -84,19 +85,19 @@ HELD_SOURCE = "methods/held_bodies.cpp"
 
 def pattern(name: str) -> str:
     """What defines a constant, up to its value."""
-    return rf"(constexpr [\w:]+ {name} = )([^;]+);"
+    return rf"(constexpr [\w:]+ {name} =\s+)([^;]+);"
 
 
-def varied(name: str, kind: str, *values: float) -> Constant:
+def varied(name: str, kind: str, *values: float, source: str = HELD_SOURCE) -> Constant:
     """A constant of the stages that hold bodies; without values half and double of its own."""
-    text = (ROOT / "core" / HELD_SOURCE).read_text(encoding="utf-8")
+    text = (ROOT / "core" / source).read_text(encoding="utf-8")
     found = re.search(pattern(name), text)
     if found is None:
-        raise SystemExit(f"there is no constant {name} in core/{HELD_SOURCE}")
+        raise SystemExit(f"there is no constant {name} in core/{source}")
     value = float(found[2])
     whole = " int " in found[1] or "int64_t" in found[1]
     others = values or ((value // 2, 2 * value) if whole else (value / 2, 2 * value))
-    return Constant(name, HELD_SOURCE, (found[2], *(f"{other:g}" for other in others)), kind)
+    return Constant(name, source, (found[2], *(f"{other:g}" for other in others)), kind)
 
 
 CONSTANTS = [
@@ -136,6 +137,16 @@ CONSTANTS = [
     varied("most_tau", "jammed", 2, 4),
     varied("second_cap", "jammed", 0.9, 0.6),  # half and double of what is left of it
     varied("most_moving", "crowded", 0.5, 0.8, 1),
+    *(
+        varied(name, "batches", source="embed/small_solver.cpp")
+        for name in (
+            "least_projections",
+            "most_projections",
+            "few_newton_steps",
+            "near_end",
+            "most_steps_alone",
+        )
+    ),
 ]
 
 
@@ -169,6 +180,12 @@ PACKINGS = [  # contacts, push, seed
     for push in (0.0, 1.0)
     for seed in range(100, 104)
 ]
+
+# how many of each kind take about as long
+BATCHES = {"1": 8000, "4": 1200, "8": 200, "16": 50, "64": 6}
+BATCH_SEED = 7  # another one than that of small_problems.py
+BATCH_TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
+BATCH_REPEATS = 7
 
 # ---- the problems
 
@@ -238,8 +255,32 @@ def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[s
             yield str(number), problem, None if guess is None else fclib.Solution(r=guess)
 
 
+def measure_batches() -> dict[str, Any]:
+    """The same of batches; CPU times are those of the calls, the least of some."""
+    problems = solved = 0
+    spent = 0.0
+    for name, count in BATCHES.items():
+        for at_rest in (False, True):
+            W, q, mu, _ = small_scenes.problems(name, count, BATCH_SEED, at_rest)
+            noise = np.random.default_rng(BATCH_SEED).normal(size=q.shape)
+            before = fclib.solve_batch(W, q * (1 + 0.01 * noise), mu, tol=1e-10).r
+            for guess in (None, before):
+                for tol in BATCH_TOLERANCES:
+                    least = np.inf
+                    for _ in range(BATCH_REPEATS):
+                        start = time.process_time()
+                        found = fclib.solve_batch(W, q, mu, guess=guess, tol=tol)
+                        least = min(least, time.process_time() - start)
+                    problems += count
+                    solved += int(np.sum(found.converged))
+                    spent += least
+    return {"problems": problems, "solved": solved, "CPU [s]": spent, "late": []}
+
+
 def measure(job: dict[str, Any]) -> dict[str, Any]:
     """Solve the problems of a kind: how many, how many solved, CPU time [s], and who came where."""
+    if job["kind"] == "batches":
+        return measure_batches()
     kind, chain, seconds = job["kind"], job["chain"], job["seconds"]
     options: dict[str, Any] = {"chain": chain} if chain else {}
     tol = planted_judge.TOLERANCE
@@ -350,7 +391,8 @@ def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
     given: dict[str, list[str]] = {"no memory": files}
     for constant in CONSTANTS:
         kind = constant.problems
-        if not wanted(f"{constant.name} {HELD if constant.source == HELD_SOURCE else ''}"):
+        held = HELD if constant.source == HELD_SOURCE else ""
+        if not wanted(f"{constant.name} {kind} {held}"):
             continue
         if kind in {"no memory", "crowded"} and not files:
             continue
@@ -417,6 +459,9 @@ def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
         f"counts as {seconds}. A rule without a number is that of all stages of the "
         "name.",
         "crowded": "Crowded ones: files of the families to choose on that come to these stages.",
+        "batches": "Batches: boxes of 1 to 64 contacts, thrown and at rest, cold and warm, to "
+        f"{', '.join(map(_results.power, BATCH_TOLERANCES))}; CPU times are those of the calls, "
+        f"the least of {BATCH_REPEATS}.",
     }
     return " ".join(text for kind, text in told.items() if kind in kinds)
 

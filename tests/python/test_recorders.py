@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 import fclib
 from fclib import recorders
 from fclib.cli import app
-from fclib.recorders import _newton
+from fclib.recorders import _genesis, _newton
 from helpers import dense, needs_siconos_mechanics
 
 H = 1e-3
@@ -881,8 +881,8 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
     for arguments, message in (
         (
             ["nothing", "x.py"],
-            "no engine 'nothing' is recorded; there is: drake, lmgc90, mujoco, mujoco_warp,"
-            " newton, pybullet, siconos",
+            "no engine 'nothing' is recorded; there is: drake, genesis, lmgc90, mujoco,"
+            " mujoco_warp, newton, pybullet, siconos",
         ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):
@@ -1282,3 +1282,168 @@ def test_scripts_end_as_they_like(
     assert said in " ".join(done.output.split())
     if said.endswith("steps"):
         assert len(list((tmp_path / "out").glob("*.hdf5"))) == int(said[0])
+
+
+class Tensor:
+    """An array of one world, as Genesis keeps it: the world is the last axis."""
+
+    def __init__(self, values: Any) -> None:
+        self.values = np.asarray(values)[..., None]
+        if self.values.dtype == float:
+            self.values = self.values.astype(np.float32)
+        self.shape = self.values.shape
+
+    def to_numpy(self) -> Any:
+        return self.values
+
+
+class Mapped(Tensor):
+    """An array of contacts with components: the world is the second axis."""
+
+    def __init__(self, values: Any) -> None:
+        super().__init__(values)
+        self.values = np.moveaxis(self.values, -1, 1)
+
+
+WEIGHT = 2 * 9.81  # [N]
+
+
+def box_in_genesis(
+    monkeypatch: pytest.MonkeyPatch, elliptic: bool, spins: bool = False, world: int = 0
+) -> Any:
+    """What Genesis keeps of a box at rest on the ground, which it pushes to a side."""
+    corners = 0.1 * np.array([(x, y, -1.0) for x in (-1, 1) for y in (-1, 1)])
+    n, mu = np.array([0.0, 0, -1]), 0.5  # from the box to the ground
+    d1, d2 = np.array([-1.0, 0, 0]), np.array([0.0, 1, 0])
+
+    def row(axis: Any, turn: Any, at: Any) -> Any:
+        return np.concatenate([axis, np.cross(at, axis) + turn])
+
+    zero = np.zeros(3)
+    if elliptic:
+        axes = [(-n, zero), (d1, zero), (d2, zero), *([(zero, -n)] if spins else [])]
+        forces = [WEIGHT / 4, 0.25, 0.0, *([0.0] if spins else [])]
+    else:
+        axes = [(sign * mu * d - n, zero) for d in (d1, d2) for sign in (-1, 1)]
+        own = 0.25 / (2 * mu)
+        forces = [WEIGHT / 16 - own, WEIGHT / 16 + own, WEIGHT / 16, WEIGHT / 16]
+    J = np.array([row(*axis, at) for at in corners for axis in axes])
+    M = np.diag([2.0, 2, 2, 0.01, 0.01, 0.01])
+    force = np.tile(forces, 4)
+    h, smooth = 0.005, np.array([0.0, 0, -9.81, 0, 0, 0])
+    vel = Tensor(np.zeros(6))
+    after = h * (smooth + np.linalg.solve(M, J.T @ force))
+    kinds = SimpleNamespace(approximate_implicitfast=2)
+
+    def integrator(value: int) -> Any:
+        return SimpleNamespace(name="Euler")
+
+    integrator.approximate_implicitfast = kinds.approximate_implicitfast  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "genesis", SimpleNamespace(integrator=integrator))
+    monkeypatch.setattr(_genesis, "pinned", lambda: "1.4.5")
+    solver = SimpleNamespace(
+        rigid_config=SimpleNamespace(
+            integrator=2,
+            enable_elliptic_friction=elliptic,
+            enable_torsional_friction=spins,
+            enable_rolling_friction=False,
+            enable_signorini_contact=elliptic,
+            rows_per_contact=len(axes),
+            use_hibernation=False,
+        ),
+        sim=SimpleNamespace(coupler=None, cur_t=0.1),
+        substep_dt=h,
+        links=[SimpleNamespace(name="ground"), SimpleNamespace(name="box")],
+        rigid_info=SimpleNamespace(mass_mat=Tensor(np.tril(M))),
+        dyn_state=SimpleNamespace(dofs=SimpleNamespace(vel=vel, acc_smooth=Tensor(smooth))),
+        constraint_solver=SimpleNamespace(
+            constraint_state=SimpleNamespace(
+                n_constraints=Tensor(len(J)),
+                n_constraints_equality=Tensor(0),
+                n_constraints_frictionloss=Tensor(0),
+                jac=Tensor(J),
+                efc_force=Tensor(force),
+                efc_frictionloss=Tensor(np.zeros(len(J))),
+            )
+        ),
+        collider=SimpleNamespace(
+            collider_state=SimpleNamespace(
+                n_contacts=Tensor(4),
+                contact_sort_idx=Tensor(np.arange(4)[::-1]),
+                contact_data=SimpleNamespace(
+                    link_a=Tensor(np.zeros(4, int)),
+                    link_b=Tensor(np.ones(4, int)),
+                    pos=Mapped(corners[::-1]),
+                    normal=Mapped(np.tile(n, (4, 1))),
+                    penetration=Tensor(np.full(4, 1e-5)),
+                    friction=Tensor(np.full(4, mu)),
+                    friction_torsional=Tensor(np.full(4, 0.01)),
+                    friction_rolling=Tensor(np.zeros(4)),
+                ),
+            )
+        ),
+    )
+
+    def substep(f: int) -> None:
+        vel.values = np.asarray(after, dtype=np.float32)[:, None]
+
+    solver.substep = substep
+    return SimpleNamespace(rigid_solver=solver, step=lambda: solver.substep(0))
+
+
+@pytest.mark.parametrize(("elliptic", "spins"), [(True, False), (False, False), (True, True)])
+def test_a_step_of_genesis_gives_its_problem(
+    elliptic: bool, spins: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = recorders.genesis(box_in_genesis(monkeypatch, elliptic, spins))
+    problem = step.problem
+    assert (problem.nc, problem.spacedim) == (4, 3 + spins)
+    assert step.mismatch is not None
+    assert step.mismatch < 1e-6
+    assert step.contacts is not None
+    frame, point = step.contacts.frame, step.contacts.point
+    assert frame is not None
+    assert point is not None
+    np.testing.assert_array_equal(np.linalg.det(frame), 1)
+    np.testing.assert_array_equal(frame[:, 0], np.tile([0, 0, 1], (4, 1)))
+    # the columns of H are those of the points and the frames
+    H = problem.H.toarray()
+    for k in range(4):
+        rows = np.hstack([frame[k], np.cross(point[k], frame[k])])
+        own = H[:, problem.spacedim * k : problem.spacedim * k + 3].T
+        np.testing.assert_allclose(own, rows, atol=1e-7)
+    assert step.guess is not None
+    r = step.guess.r.reshape(4, -1)
+    np.testing.assert_allclose(r[:, 0], 0.005 * WEIGHT / 4, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.einsum("ki,kij->kj", r[:, :3], frame)[:, 0], -0.005 * 0.25, rtol=1e-6
+    )
+    assert fclib.solve(problem, tol=1e-9).converged
+    assert "single precision" in " ".join(step.notes)
+
+
+def test_steps_of_genesis_that_are_not_recorded_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = box_in_genesis(monkeypatch, elliptic=False)
+    config = scene.rigid_solver.rigid_config
+    with pytest.raises(ValueError, match="there is no world 1: there are 1"):
+        recorders.genesis(scene, 1)
+    for name, value, word in (
+        ("integrator", 0, "integrator Euler of Genesis is not recorded"),
+        ("use_hibernation", True, "bodies that sleep"),
+        ("enable_torsional_friction", True, "pyramids with torsional friction"),
+    ):
+        before = getattr(config, name)
+        setattr(config, name, value)
+        with pytest.raises(recorders.SetupError, match=word):
+            recorders.genesis(scene)
+        setattr(config, name, before)
+    scene.rigid_solver.collider.collider_state.contact_data.friction.values[1] = 0
+    with pytest.raises(ValueError, match="contact 2: a pyramid without friction"):
+        recorders.genesis(scene)
+
+
+def test_another_version_of_genesis_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "genesis", SimpleNamespace())
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "1.5.0")
+    with pytest.raises(ImportError, match=r"pip install \"genesis-world==1.4.\*\""):
+        recorders.genesis(None)

@@ -14,7 +14,8 @@ def command(
     engine: Annotated[
         str,
         typer.Argument(
-            help="drake, lmgc90, mujoco, mujoco_warp, newton, pybullet or siconos, installed.",
+            help="drake, genesis, lmgc90, mujoco, mujoco_warp, newton, pybullet or siconos,"
+            " installed.",
             show_default=False,
         ),
     ],

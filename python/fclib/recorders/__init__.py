@@ -8,8 +8,8 @@ _assemble.py   common parts: order of rows, redundant joints, limits, dry fricti
 _recorded.py   a recorded step, what is exact in it, and a folder or a sequence of them
 _criteria.py   how far a simulator's reactions are from Coulomb's law
 _scripts.py    steps of a user's script, while it runs
-_drake.py, _lmgc90.py, _mujoco.py, _mujoco_warp.py, _newton.py, _pinocchio.py, _pybullet.py,
-_siconos.py        one engine each
+_drake.py, _genesis.py, _lmgc90.py, _mujoco.py, _mujoco_warp.py, _newton.py, _pinocchio.py,
+_pybullet.py, _siconos.py        one engine each
 _lmgc90_steps.py   run in a process of its own, which LMGC90 may end
 _siconos_steps.py  run by the interpreter that has Siconos
 
@@ -28,6 +28,7 @@ from fclib.recorders._assemble import (
 )
 from fclib.recorders._criteria import CRITERIA, Judgement, criteria_of, judge, summary
 from fclib.recorders._drake import drake
+from fclib.recorders._genesis import genesis
 from fclib.recorders._lmgc90 import lmgc90
 from fclib.recorders._mujoco import mujoco
 from fclib.recorders._mujoco_warp import mujoco_warp
@@ -54,6 +55,7 @@ __all__ = [
     "associated_error",
     "criteria_of",
     "drake",
+    "genesis",
     "judge",
     "lmgc90",
     "mujoco",

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from fclib.recorders import (
     _drake,
+    _genesis,
     _lmgc90,
     _mujoco,
     _mujoco_warp,
@@ -23,6 +24,9 @@ from fclib.recorders import (
     _siconos,
 )
 from fclib.recorders._recorded import Recording
+
+# packages of an engine that are not in the extra, since they are gigabytes
+APART: Final = {"genesis": "genesis-world torch"}
 
 
 @contextmanager
@@ -156,6 +160,31 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
 
 
 @contextmanager
+def _steps_of_genesis(recording: Recording) -> Iterator[None]:
+    version = _genesis.pinned()
+    name = "genesis.engine.solvers.rigid.rigid_solver"
+    kind: Any = importlib.import_module(name).RigidSolver
+    original = kind.substep
+
+    def step(self: Any, f: int) -> None:
+        taken: list[bool] = []
+
+        def once() -> None:
+            original(self, f)
+            taken.append(True)
+
+        recording.take(partial(_genesis.record, self, 0, version, once))
+        if not taken:  # the step was not kept, or is left out
+            original(self, f)
+
+    kind.substep = step
+    try:
+        yield
+    finally:
+        kind.substep = original
+
+
+@contextmanager
 def _closed_at_exit(recording: Recording) -> Iterator[None]:
     """Close the recording also if the script ends the process at once."""
     original, own = os._exit, os.getpid()
@@ -187,8 +216,9 @@ def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequ
                 raise ValueError(f"{script}: ended with {end.code}") from None
         except Exception as error:
             if isinstance(error, ModuleNotFoundError) and error.name == module:
+                wanted = APART.get(module, "'fclib[recorders]'")
                 raise ImportError(
-                    f"{module} is not installed; install it with: pip install 'fclib[recorders]'"
+                    f"{module} is not installed; install it with: pip install {wanted}"
                 ) from None
             kind = type(error).__name__
             raise ValueError(f"{script}{_line_of(error, script)}: {kind}: {error}") from error
@@ -212,6 +242,7 @@ def _line_of(error: Exception, script: Path) -> str:
 
 ENGINES: Final[dict[str, Callable[..., None]]] = {
     "drake": _in_this_process(_steps_of_drake, "pydrake"),
+    "genesis": _in_this_process(_steps_of_genesis, "genesis"),
     "lmgc90": _lmgc90.record,
     "mujoco": _in_this_process(_steps_of_mujoco, "mujoco"),
     "mujoco_warp": _in_this_process(_steps_of_mujoco_warp, "mujoco_warp"),

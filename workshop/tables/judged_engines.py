@@ -3,11 +3,11 @@
     PYTHON -m workshop.tables.judged_engines [--scene slide ...] [--steps 500] [--page FILE]
         [--results judged-engines]
 
-PYTHON has fclib, MuJoCo, MuJoCo Warp, Drake, Newton and PyBullet; Siconos has an interpreter of its
-own (fclib.external.siconos). Engines that are not installed are left out, and said, and those whose
-joints are not recorded of the gripper. Each engine has its
-default settings, but for the scene, the time step of 2 ms, Coulomb's coefficient and the damping of
-velocities, which is 0. The criteria are those of `fclib judge`.
+PYTHON has fclib, MuJoCo, MuJoCo Warp, Drake, Genesis, Newton and PyBullet; Siconos has an
+interpreter of its own (fclib.external.siconos). Engines that are not installed are left out, and
+said, and those whose joints are not recorded of the gripper. Each engine has its default settings,
+but for the scene, the time step of 2 ms, Coulomb's coefficient and the damping of velocities, which
+is 0; Genesis has elliptic cones. The criteria are those of `fclib judge`.
 """
 
 from __future__ import annotations
@@ -128,6 +128,36 @@ def mujoco_warps(scene: str, steps: int) -> Iterator[Any]:
     warp_data = mujoco_warp.put_data(model, data, nconmax=ROOM, njmax=4 * ROOM)
     for _ in range(steps):
         yield recorders.mujoco_warp(model, warp_model, warp_data)
+
+
+def geneses(scene: str, steps: int) -> Iterator[Any]:
+    """Genesis' steps, in single precision, by its law for sliding contacts."""
+    import genesis as gs
+
+    boxes = free_boxes(scene)
+    if not getattr(gs, "_initialized", False):
+        gs.init(backend=gs.cpu, logging_level="error")
+    world = gs.Scene(
+        show_viewer=False,
+        sim_options=gs.options.SimOptions(dt=H, substeps=1),
+        rigid_options=gs.options.RigidOptions(friction_cone=gs.friction_cone.elliptic),
+    )
+    world.add_entity(gs.morphs.Plane(), material=gs.materials.Rigid(friction=MU))
+    bodies = []
+    for box in boxes:
+        size = tuple(2 * half for half in box.half)
+        rho = box.mass / math.prod(size)
+        bodies.append(
+            world.add_entity(
+                gs.morphs.Box(pos=box.place, size=size),
+                material=gs.materials.Rigid(rho=rho, friction=MU),
+            )
+        )
+    world.build()
+    for body, box in zip(bodies, boxes, strict=True):
+        body.set_dofs_velocity([*box.velocity, 0.0, 0.0, 0.0])
+    for _ in range(steps):
+        yield recorders.genesis(world)
 
 
 def free_boxes(scene: str) -> list[Box]:
@@ -287,6 +317,7 @@ ENGINES: dict[str, Callable[[str, int], Iterator[Any]]] = {
     "MuJoCo": mujocos,
     "MuJoCo Warp": mujoco_warps,
     "Drake": drakes,
+    "Genesis": geneses,
     "Newton": newtons,
     "PyBullet": bullets,
     "Siconos": siconoses,

@@ -1447,3 +1447,38 @@ def test_another_version_of_genesis_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("importlib.metadata.version", lambda name: "1.5.0")
     with pytest.raises(ImportError, match=r"pip install \"genesis-world==1.4.\*\""):
         recorders.genesis(None)
+
+
+def test_a_script_of_genesis_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each substep, but for the one that a scene takes and undoes while it is built."""
+    scene = box_in_genesis(monkeypatch, elliptic=True)
+    solver, substep = scene.rigid_solver, scene.rigid_solver.substep
+
+    class RigidSolver:
+        def substep(self, f: int) -> None:
+            substep(f)
+
+    class Scene:
+        def build(self) -> None:
+            self.solver = RigidSolver()
+            vars(self.solver).update({k: v for k, v in vars(solver).items() if k != "substep"})
+            self.solver.substep(0)
+
+        def step(self) -> None:
+            self.solver.substep(0)
+
+    module: Any = sys.modules["genesis"]
+    module.Scene = Scene
+    name = "genesis.engine.solvers.rigid.rigid_solver"
+    monkeypatch.setitem(sys.modules, name, SimpleNamespace(RigidSolver=RigidSolver))
+    script = tmp_path / "box.py"
+    script.write_text(
+        "import genesis as gs\nscene = gs.Scene()\nscene.build()\n"
+        "for _ in range(6):\n    scene.step()\n"
+    )
+    recording = recorders.record_script("genesis", script, tmp_path / "out", every=5)
+    assert (recording.seen, recording.written) == (6, 2)
+    assert [p.name for p in sorted((tmp_path / "out").glob("*"))] == [
+        "genesis-000000.hdf5",
+        "genesis-000005.hdf5",
+    ]

@@ -112,7 +112,7 @@ def runner(
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
         from distributed.scheduler import KilledWorker
 
         waiting: dict[Any, Job] = {}

@@ -164,9 +164,21 @@ def _steps_of_genesis(recording: Recording) -> Iterator[None]:
     version = _genesis.pinned()
     name = "genesis.engine.solvers.rigid.rigid_solver"
     kind: Any = importlib.import_module(name).RigidSolver
-    original = kind.substep
+    scene: Any = importlib.import_module("genesis").Scene
+    original, build = kind.substep, scene.build
+    building: list[Any] = []
+
+    def built(self: Any, *arguments: Any, **options: Any) -> Any:
+        building.append(self)
+        try:
+            return build(self, *arguments, **options)
+        finally:
+            building.pop()
 
     def step(self: Any, f: int) -> None:
+        if building:  # a step that compiles, and is undone
+            original(self, f)
+            return
         taken: list[bool] = []
 
         def once() -> None:
@@ -177,11 +189,11 @@ def _steps_of_genesis(recording: Recording) -> Iterator[None]:
         if not taken:  # the step was not kept, or is left out
             original(self, f)
 
-    kind.substep = step
+    kind.substep, scene.build = step, built
     try:
         yield
     finally:
-        kind.substep = original
+        kind.substep, scene.build = original, build
 
 
 @contextmanager

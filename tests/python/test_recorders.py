@@ -1422,6 +1422,18 @@ def test_a_step_of_genesis_gives_its_problem(
     assert "single precision" in " ".join(step.notes)
 
 
+def test_a_reaction_that_does_not_give_the_velocity_makes_nothing_exact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = box_in_genesis(monkeypatch, elliptic=True)
+    assert recorders.genesis(scene).fields["M"] == "exact"
+    # as the forces of a sweep that follows the solver
+    scene.rigid_solver.constraint_solver.constraint_state.efc_force.values[0] *= 1.5
+    step = recorders.genesis(scene)
+    assert (step.fields["M"], step.fields["f"]) == ("reconstructed", "reconstructed")
+    assert "Genesis's reaction gives its next velocity to" in step.notes[-1]
+
+
 def test_steps_of_genesis_that_are_not_recorded_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = box_in_genesis(monkeypatch, elliptic=False)
     config = scene.rigid_solver.rigid_config

@@ -24,6 +24,7 @@ from fclib import _core, _laws, _solve
 Vector = npt.NDArray[np.float64]
 ORDERS: Final = {"NTT": (0, 1, 2), "TTN": (2, 0, 1)}
 RANK: Final = 1e-9  # least size of an independent row of a joint, relative to the largest
+RANK_SINGLE: Final = 1e-5  # the same of rows in single precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,6 +250,38 @@ def independent(
         share = np.linalg.lstsq(scaled[:, kept], scaled[:, others], rcond=None)[0]
         violated = float(np.abs(b[others] - share.T @ b[kept]).max())
     return kept.astype(np.int64), violated
+
+
+def reaction_of(
+    assembled: Assembled,
+    contacts: Vector,
+    limits: Vector,
+    dry: tuple[Vector, Vector],
+    joints: tuple[Vector, Vector],
+) -> _core.Solution:
+    """The reaction that an engine found, for the contacts and the kept rows of a problem.
+
+    Args:
+        assembled: the problem.
+        contacts: (nc x d) impulses [N s], [N m s].
+        limits: (k) impulses of the limits [N s], [N m s].
+        dry: impulses of dry friction and their bounds [N s], [N m s].
+        joints: rows (p x n) of the joints, and their impulses (p).
+    """
+    impulse, bound = dry
+    r = np.zeros((assembled.problem.nc, contacts.shape[1]))
+    nc, end = len(contacts), len(contacts) + len(limits)
+    r[:nc] = contacts
+    r[nc:end, 0] = limits
+    # the bound presses dry friction
+    r[end:, 0], r[end:, 1] = bound, impulse
+    multipliers = None
+    if assembled.problem.p:
+        # multipliers of the kept rows that have the effect of all
+        J, own = joints
+        kept = np.setdiff1d(np.arange(len(J)), assembled.redundant)
+        multipliers = np.linalg.lstsq(J[kept].T, J.T @ own, rcond=None)[0]
+    return _core.Solution(r=r.ravel(), l=multipliers)
 
 
 def associated_error(problem: Any, r: npt.ArrayLike) -> float:

@@ -9,20 +9,29 @@ friction; with pyramids it has N + mu T and N - mu T for each tangent T.
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core
-from fclib.recorders._assemble import Contacts, DryFriction, Joints, Limits, Vector, assemble
-from fclib.recorders._recorded import Recorded, SetupError
+from fclib.recorders import _recorded
+from fclib.recorders._assemble import (
+    RANK,
+    RANK_SINGLE,
+    Contacts,
+    DryFriction,
+    Joints,
+    Limits,
+    Vector,
+    assemble,
+    reaction_of,
+)
+from fclib.recorders._recorded import EXACT, Recorded, SetupError, checked
 
 VERSION: Final = "1.4"  # whose private data are known
 LICENCE: Final = "Apache-2.0"
-RANK: Final = 1e-5  # of rows in single precision
+SINGLE: Final = 4  # bytes of a number in single precision
 LAWS: Final = {
     "signorini": "Coulomb friction on soft contacts, by successive convex problems",
     "convex": "soft contacts, by convex optimisation",
@@ -61,14 +70,7 @@ def genesis(scene: Any, world: int = 0) -> Recorded:
 
 def pinned() -> str:
     """The version of Genesis. ImportError if it is not the one whose data are known."""
-    importlib.import_module("genesis")
-    version = importlib.metadata.version("genesis-world")
-    if version.split(".")[:2] != VERSION.split("."):
-        raise ImportError(
-            f"genesis-world {version} is installed, and private data of version {VERSION} are read:"
-            f' pip install "genesis-world=={VERSION}.*"'
-        )
-    return version
+    return _recorded.pinned("genesis", "genesis-world", VERSION)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,31 +108,21 @@ def record(solver: Any, world: int, version: str, step: Callable[[], None]) -> R
     contacts, reaction = contacts_of(found, elliptic, h)
     equality, dry, contact = found.ends
     joints = found.J[:equality]
+    rank = RANK_SINGLE if found.precision == SINGLE else RANK
     bound = found.strength[equality:dry]
     assembled = assemble(
         found.M,
         before + h * found.smooth,
         h,
         contacts,
-        Joints(jacobian=joints, rank=RANK) if equality else None,
+        Joints(jacobian=joints, rank=rank) if equality else None,
         Limits(jacobian=found.J[contact:]) if len(found.J) > contact else None,
         DryFriction(jacobian=found.J[equality:dry], bound=bound) if dry > equality else None,
     )
     force = h * found.force
-    r = np.zeros((assembled.problem.nc, contacts.components))
-    nc, end = len(contacts), len(contacts) + len(found.J) - contact
-    r[:nc] = reaction
-    r[nc:end, 0] = force[contact:]
-    # the bound presses dry friction
-    r[end:, 0], r[end:, 1] = h * bound, force[equality:dry]
-    multipliers = None
-    if assembled.problem.p:
-        # multipliers of the kept rows that have the effect of all
-        kept = np.setdiff1d(np.arange(equality), assembled.redundant)
-        multipliers = np.linalg.lstsq(joints[kept].T, joints.T @ force[:equality], rcond=None)[0]
     law = "signorini" if config.enable_signorini_contact else "convex"
     cone = "elliptic" if elliptic else "pyramidal"
-    return Recorded(
+    recorded = Recorded(
         assembled=assembled,
         engine="Genesis",
         version=version,
@@ -146,16 +138,23 @@ def record(solver: Any, world: int, version: str, step: Callable[[], None]) -> R
             "mu": "exact",
             **(dict.fromkeys(("G", "b"), "reconstructed") if assembled.problem.p else {}),
         },
-        guess=_core.Solution(r=r.ravel(), l=multipliers),
+        guess=reaction_of(
+            assembled,
+            reaction,
+            force[contact:],
+            (force[equality:dry], h * bound),
+            (joints, force[:equality]),
+        ),
         velocity=found.velocity,
         contacts=contacts,
         notes=(
             "w is gap / h if a contact is open, and 0 if it is closed: no penetration is"
             " corrected. Joints are rigid.",
-            f"The data are of {'double' if found.precision == 8 else 'single'} precision.",
+            f"The data are of {'single' if found.precision == SINGLE else 'double'} precision.",
         ),
         more={"world": world, "body_names": [str(link.name) for link in solver.links]},
     )
+    return checked(recorded, EXACT[found.precision])
 
 
 def check(solver: Any, world: int) -> None:

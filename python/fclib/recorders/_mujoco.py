@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fclib import _core
 from fclib.recorders._assemble import (
     Contacts,
     DryFriction,
@@ -24,12 +22,12 @@ from fclib.recorders._assemble import (
     Limits,
     Vector,
     assemble,
+    reaction_of,
 )
-from fclib.recorders._recorded import Recorded, SetupError
+from fclib.recorders._recorded import EXACT, Recorded, SetupError, checked
 from fclib.scenes.shared.condim import has_condim, spins
 
 LICENCE = "Apache-2.0"
-EXACT = 1e-8  # largest difference of the velocities of a step that is exact, relative
 
 
 def mujoco(model: Any, data: Any) -> Recorded:
@@ -48,9 +46,9 @@ def mujoco(model: Any, data: Any) -> Recorded:
 
 
 def record(
-    mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None], exact: float = EXACT
+    mj: Any, model: Any, data: Any, step: Callable[[Any, Any], None], exact: float = EXACT[8]
 ) -> Recorded:
-    """As `mujoco`, for the module and its stepping function; `exact` is in place of EXACT."""
+    """As `mujoco`, for the module and its stepping function; `exact` is for `checked`."""
     known = {
         mj.mjtIntegrator.mjINT_EULER: "Euler",
         mj.mjtIntegrator.mjINT_IMPLICITFAST: "implicitfast",
@@ -100,18 +98,6 @@ def record(
         else None,
         DryFriction(jacobian=J[dry], bound=bound) if dry.any() else None,
     )
-    r = np.zeros((assembled.problem.nc, contacts.components))
-    nc, end = len(contacts), len(contacts) + int(limits.sum())
-    r[:nc] = reaction
-    r[nc:end, 0] = force[limits]
-    # the bound presses dry friction
-    r[end:, 0], r[end:, 1] = h * bound, force[dry]
-    multipliers = None
-    if assembled.problem.p:
-        # multipliers of the kept rows that have the effect of all
-        kept = np.setdiff1d(np.arange(joints.sum()), assembled.redundant)
-        whole = J[joints].T @ force[joints]
-        multipliers = np.linalg.lstsq(J[joints][kept].T, whole, rcond=None)[0]
     cone = "elliptic" if model.opt.cone == mj.mjtCone.mjCONE_ELLIPTIC else "pyramidal"
     recorded = Recorded(
         assembled=assembled,
@@ -129,7 +115,13 @@ def record(
             "mu": "exact",
             **(dict.fromkeys(("G", "b"), "reconstructed") if assembled.problem.p else {}),
         },
-        guess=_core.Solution(r=r.ravel(), l=multipliers),
+        guess=reaction_of(
+            assembled,
+            reaction,
+            force[limits],
+            (force[dry], h * bound),
+            (J[joints], force[joints]),
+        ),
         velocity=np.array(data.qvel),
         contacts=contacts,
         notes=(
@@ -142,18 +134,7 @@ def record(
             "body_names": [model.body(i).name or f"body {i}" for i in range(model.nbody)],
         },
     )
-    off = recorded.mismatch or 0.0
-    if off <= exact * max(1.0, float(np.abs(recorded.velocity).max(initial=0.0))):
-        return recorded
-    # a force that the integrator treats in a way of its own, as damping that is not linear
-    return replace(
-        recorded,
-        fields={**recorded.fields, "M": "reconstructed", "f": "reconstructed"},
-        notes=(
-            *recorded.notes,
-            f"MuJoCo's reaction gives its next velocity to {off:.1e} only: in m/s or rad/s.",
-        ),
-    )
+    return checked(recorded, exact)
 
 
 def inertia(mj: Any, model: Any, data: Any) -> Vector:

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from fclib.recorders import _mujoco
-from fclib.recorders._recorded import Recorded, SetupError
-
-EXACT: Final = 1e-4  # largest difference of the velocities of a step that is exact, relative
+from fclib.recorders._recorded import EXACT, Recorded, SetupError
 
 
 def mujoco_warp(model: Any, warp_model: Any, warp_data: Any, world: int = 0) -> Recorded:
@@ -55,7 +53,7 @@ def record(
             raise ValueError(f"the step has {rows} rows and memory for {room}: make njmax larger")
         warp.get_data_into(data, model, warp_data, world)
 
-    recorded = _mujoco.record(mj, model, data, stepped, exact=EXACT)
+    recorded = _mujoco.record(mj, model, data, stepped, exact=EXACT[4])
     return replace(
         recorded,
         engine="MuJoCo Warp",

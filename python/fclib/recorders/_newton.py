@@ -13,19 +13,25 @@ of single precision. They are private to the solver, so only one version of Newt
 
 from __future__ import annotations
 
-import importlib
-import importlib.metadata
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from fclib import _core
-from fclib.recorders._assemble import Contacts, DryFriction, Joints, Limits, Vector, assemble
+from fclib.recorders import _recorded
+from fclib.recorders._assemble import (
+    RANK_SINGLE,
+    Contacts,
+    DryFriction,
+    Joints,
+    Limits,
+    Vector,
+    assemble,
+)
 from fclib.recorders._recorded import Recorded, SetupError
 
 VERSION: Final = "1.8"  # the version whose private data are known
-RANK: Final = 1e-5  # least size of an independent row of a joint in single precision
 PRECISION: Final = 2.0**-24  # half the last digit of single precision
 
 
@@ -80,14 +86,7 @@ def newton(solver: Any, world: int = 0) -> Recorded:
 
 def pinned() -> str:
     """Newton's version. ImportError if it is not the one whose data are known."""
-    importlib.import_module("newton")
-    version = importlib.metadata.version("newton")
-    if version.split(".")[:2] != VERSION.split("."):
-        raise ImportError(
-            f"newton {version} is installed, and private data of newton {VERSION} are read:"
-            f' pip install "newton=={VERSION}.*"'
-        )
-    return version
+    return _recorded.pinned("newton", "newton", VERSION)
 
 
 def recorded(step: Step, version: str) -> Recorded:
@@ -120,7 +119,7 @@ def recorded(step: Step, version: str) -> Recorded:
         np.linalg.solve(M, f),
         step.h,
         contacts,
-        Joints(jacobian=rigid[0], b=rigid[1], rank=RANK) if step.rigid else None,
+        Joints(jacobian=rigid[0], b=rigid[1], rank=RANK_SINGLE) if step.rigid else None,
         Limits(jacobian=limits[0], w=limits[1]) if step.limits else None,
         DryFriction(jacobian=dry, bound=step.bound / step.h) if step.dry else None,
         compliance if compliance is not None and compliance.any() else None,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.metadata
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -15,6 +17,8 @@ from fclib._sequence import SUFFIXES
 from fclib.recorders._assemble import Assembled, Contacts
 
 Origin = Literal["exact", "reconstructed"]
+# largest difference of the velocities of a step that is exact, relative, by the bytes of a number
+EXACT: Final = {4: 1e-4, 8: 1e-8}
 # components of a contact, by their number
 AXES: Final = {
     2: "N, T",
@@ -122,6 +126,40 @@ class Recorded:
     def guesses(self) -> list[_core.Solution]:
         """The engine's reaction, if it gave one."""
         return [] if self.guess is None else [self.guess]
+
+
+def checked(recorded: Recorded, exact: float) -> Recorded:
+    """The step; its M and f are exact only if the reaction gives the engine's velocity.
+
+    Args:
+        recorded: a step whose engine gave its reaction.
+        exact: largest difference of the velocities, relative to the largest one, or to 1.
+    """
+    off = recorded.mismatch or 0.0
+    if off <= exact * max(1.0, float(np.abs(recorded.velocity).max(initial=0.0))):
+        return recorded
+    # a force that the integrator treats in a way of its own, as damping that is not linear
+    return replace(
+        recorded,
+        fields={**recorded.fields, "M": "reconstructed", "f": "reconstructed"},
+        notes=(
+            *recorded.notes,
+            f"{recorded.engine}'s reaction gives its next velocity to {off:.1e} only: in m/s or"
+            " rad/s.",
+        ),
+    )
+
+
+def pinned(module: str, package: str, wanted: str) -> str:
+    """The version of an engine whose private data are read. ImportError if it is another one."""
+    importlib.import_module(module)
+    version = importlib.metadata.version(package)
+    if version.split(".")[:2] != wanted.split("."):
+        raise ImportError(
+            f"{package} {version} is installed, and private data of {package} {wanted} are read:"
+            f' pip install "{package}=={wanted}.*"'
+        )
+    return version
 
 
 Maker = Callable[[], Recorded | None]

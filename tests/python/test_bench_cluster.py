@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -181,6 +182,23 @@ def test_the_loss_of_the_scheduler_ends_in_a_line_and_the_campaign_goes_on(
     again = helpers_cli.run(*command, "--scheduler", scheduler.scheduler.address)
     assert again.returncode == 0, again
     assert done(store) == 24
+
+
+def test_a_connection_that_closes_is_the_end_of_the_scheduler() -> None:
+    """Also if its client does not know it yet, and then nothing more is asked of it."""
+    comm = pytest.importorskip("distributed.comm.core")
+
+    class Client:
+        status = "running"
+        scheduler = SimpleNamespace(address="tcp://nowhere:1")
+
+        def nthreads(self) -> Any:
+            raise comm.CommClosedError("in <TCP (closed)>: ConnectionResetError")
+
+        cancel = nthreads
+
+    with pytest.raises(fclib.Error, match="tcp://nowhere:1: the Dask scheduler has ended"):
+        list(cluster.runner(Client())(iter([])))
 
 
 def done(store: Path) -> int:

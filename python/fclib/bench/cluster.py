@@ -120,6 +120,7 @@ def runner(
         sent: dict[str, Any] = {}
         number, looked = 0, time.monotonic()
         waits, progress = False, False  # for a worker; a run was done since the last look
+        gone = False  # the scheduler
         address = client.scheduler.address
 
         def file_of(problem: ProblemFacts | None) -> Any:
@@ -190,15 +191,15 @@ def runner(
                 yield job, record
         except (CancelledError, OSError, TimeoutError, RuntimeError) as error:
             # if the scheduler is gone, so are all its tasks; its client may not know it yet
-            closed = isinstance(error, CommClosedError)
-            if isinstance(error, _core.Error) or (client.status == "running" and not closed):
+            gone = client.status != "running" or isinstance(error, CommClosedError)
+            if isinstance(error, _core.Error) or not gone:
                 raise
             raise _core.Error(
                 f"{address}: the Dask scheduler has ended or does not answer; the runs that were"
                 " done are stored, and the same command does the others"
             ) from None
         finally:
-            if client.status == "running":
+            if not gone and client.status == "running":
                 client.cancel(list(waiting))
 
     return run

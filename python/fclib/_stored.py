@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 COLLECTION = "fclib_collection"  # of stored states
+RESULTS = "fclib_results"  # of published runs
 CHECKOUT = Path(__file__).resolve().parents[2]
 
 
@@ -22,3 +23,9 @@ def folder_of(package: str, in_place: Path) -> Path | None:
     if spec is None or spec.origin is None:
         return None
     return Path(spec.origin).parent
+
+
+def published_runs() -> Path | None:
+    """The folder of the parts of published runs; None if their package is not there."""
+    package = folder_of(RESULTS, CHECKOUT / "results" / RESULTS)
+    return package / "runs" if package is not None else None

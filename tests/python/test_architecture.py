@@ -141,7 +141,7 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
         "collections",
     },
-    "results": {"_core", "_verdicts", "_judge", "_digest", "bench", "collections"},
+    "results": {"_core", "_verdicts", "_judge", "_digest", "_stored", "bench", "collections"},
     "report": {
         "_laws",
         "_core",

@@ -65,7 +65,6 @@ def commands_on(store: Path, folder: Path) -> list[list[object]]:
         ["report", store, "--out", folder / "paper", "--pdf"],
         ["report", store, "--out", folder / "site"],
         ["report", store, store, "--out", folder / "sites"],
-        ["collection", "status", "standard", "--add", store],
     ]
     return found
 
@@ -83,7 +82,6 @@ def stolen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     )
     library = source.with_suffix(".so")
     subprocess.run([compiler, "-shared", "-fPIC", "-o", library, source], check=True)
-    monkeypatch.setattr("fclib.collections.ratings.write", lambda rows: tmp_path)
     yield f"plugin:{library}"
     assert not mark.exists()
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import fclib
-from fclib import _solve, scenes
+from fclib import _solve, _stored, scenes
 from fclib.analysis import analyze
 from fclib.cli import app
 
@@ -73,14 +74,17 @@ def test_standard_has_the_states_of_its_list() -> None:
 def run(problem: str, solver: str, error: float | None, **more: Any) -> ratings.Run:
     digest = {f"{c.family}/{c.number:04d}": c.digest for c in set_index.choices("tiny")}[problem]
     status = "converged" if error is not None and error <= 1e-8 else "time_limit"
-    values: dict[str, Any] = {"version": "1", "limit": 1.0, "status": status, "cpu": 0.5}
-    values |= {"error": error, "date": "2026-01-02", "solver": solver, "problem": problem} | more
-    return ratings.Run(digest=digest[: ratings.DIGITS], **values)
+    values: dict[str, Any] = {"version": "1", "time_limit": 1.0, "status": status, "cpu_s": 0.5}
+    values |= {"tol": 1e-8, "merit": "both", "start": "cold", "hash": digest, "started": SECOND}
+    return values | {"error": error, "solver": solver} | more
+
+
+SECOND, DAY = 1_767_312_000.0, 86_400.0  # [s] 2026-01-02
 
 
 @pytest.fixture
-def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package that has the published trajectories, and results of its own."""
+def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of published runs, empty, and a package of trajectories without solutions."""
     stored = published.root()
     if stored is None:
         pytest.skip("the package of trajectories is not here")
@@ -88,14 +92,25 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     package.mkdir()
     (package / published.FOLDER).symlink_to(stored)
     monkeypatch.setattr(published, "IN_PLACE", package)
-    return package / ratings.FOLDER
+    monkeypatch.setattr(_stored, "published_runs", lambda: tmp_path / "runs")
+    (tmp_path / "runs").mkdir()
+    return tmp_path / "runs"
+
+
+def publish(folder: Path, rows: list[dict[str, Any]]) -> None:
+    """Add a part with these runs."""
+    import pyarrow
+    import pyarrow.parquet
+
+    name = f"some-{len(list(folder.iterdir()))}.parquet"
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows), folder / name)
 
 
 def classes_by_problem(name: str = "tiny") -> dict[str, str]:
     return {row.id.partition("/")[2]: row.rating for row in ratings.ratings_of(name)[0]}
 
 
-def test_classes_follow_from_runs(results: Path) -> None:
+def test_classes_follow_from_runs(runs: Path) -> None:
     wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
     squeezed = "Capsules/0300"
     rows = [run(wall, name, 1e-9 if name in "abc" else None) for name in "abcd"]
@@ -106,8 +121,8 @@ def test_classes_follow_from_runs(results: Path) -> None:
     # who does not take it has no vote
     rows += [run(kaplas, "d", None, status="unsuitable")]
     # of two versions the newer one
-    rows += [run(kaplas, "c", 1e-9, date="2026-01-01", version="0")]
-    ratings.write(rows)
+    rows += [run(kaplas, "c", 1e-9, started=SECOND - DAY, version="0")]
+    publish(runs, rows)
     found = classes_by_problem()
     assert (found[wall], found[kaplas], found[discs]) == ("easy", "hard", "open")
     assert found[squeezed] == "easy"
@@ -119,21 +134,24 @@ def test_classes_follow_from_runs(results: Path) -> None:
     assert basis is not None
     assert (basis.limits, basis.solvers) == ((1.0,), tuple("abcde"))
     # a longer run has no vote, and what it solves is no longer open
-    ratings.write([*ratings.runs(), run(discs, "auto", 9e-9, limit=60.0)])
+    publish(runs, [run(discs, "auto", 9e-9, time_limit=60.0)])
     assert classes_by_problem()[discs] == "hard"
 
 
-def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
+def test_runs_vote_at_the_limit_of_their_family(runs: Path) -> None:
     wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
     rows = [run(wall, name, 1e-9) for name in "abcd"]
     # a family whose runs had longer, and not a vote of one that had less
-    rows += [run(kaplas, name, 1e-9 if name == "a" else None, limit=10.0) for name in "abc"]
-    rows += [run(kaplas, name, 1e-9, limit=1.0) for name in "de"]
+    rows += [run(kaplas, name, 1e-9 if name == "a" else None, time_limit=10.0) for name in "abc"]
+    rows += [run(kaplas, name, 1e-9, time_limit=1.0) for name in "de"]
     # of as many runs those that had less
-    rows += [run(discs, "a", 1e-9, limit=limit) for limit in (10.0, 1.0)]
+    rows += [run(discs, "a", 1e-9, time_limit=limit) for limit in (10.0, 1.0)]
     # a solution that was taken in has no vote, where nothing was run
-    rows += [run("FourBar/0150", "me", 1e-9, limit=None, status=ratings.TAKEN)]
-    ratings.write(rows)
+    bars = load("tiny/FourBar/0150")
+    finder = {"by": "me", "error": 1e-9, "date": "2026-01-02"}
+    solution = fclib.Solution(r=np.zeros(bars.spacedim * bars.nc), l=np.zeros(bars.p))
+    ratings.store_solution(bars, fclib.digest(bars), solution, finder)
+    publish(runs, rows)
     found = {row.id.partition("/")[2]: row for row in ratings.ratings_of("tiny")[0]}
     assert {name: row.limit for name, row in found.items() if row.rating} == {
         wall: 1.0,
@@ -146,16 +164,34 @@ def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
     assert "within 1 or 10 s of CPU a run, by 4 solvers (a, b, c, d;" in str(basis)
 
 
-def test_equal_runs_make_equal_tables(results: Path) -> None:
-    rows = [run("Wall/0003", name, 1e-9, limit=limit) for name in "abcdefgh" for limit in (1, 10)]
-    ratings.write(rows)
-    assert [row.limit for row in ratings.runs()] == [1, 10] * 8
+def test_of_copies_the_median_counts(runs: Path) -> None:
+    """As in a profile; the least error of all is known."""
+    rows = [run("Wall/0003", "a", 1e-9, cpu_s=cpu) for cpu in (0.9, 0.1)]
+    rows += [run("Wall/0003", "b", error) for error in (2e-3, 3e-9, None)]
+    publish(runs, rows)
+    first, second = ratings.runs()
+    assert (first.solver, first.cpu, first.solved) == ("a", 0.1, True)
+    assert (second.solver, second.error, second.solved) == ("b", 3e-9, False)
+    assert classes_by_problem()["Wall/0003"] == "hard"
 
 
-def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) -> None:
+def test_only_cold_runs_to_the_tolerance_by_both_merits_count(runs: Path) -> None:
+    others = ({"tol": 1e-4}, {"merit": "natural"}, {"start": "warm"})
+    publish(runs, [run("Wall/0003", "a", 1e-9, **other) for other in others])
+    assert ratings.runs() == ()
+
+
+def test_a_damaged_part_is_named(runs: Path) -> None:
+    (runs / "some.parquet").write_bytes(b"PAR1")
+    done = invoke("collection", "status", "tiny")
+    assert done.exit_code == 1
+    assert "some.parquet: cannot be read as published runs" in " ".join(done.output.split())
+
+
+def test_a_better_solution_is_verified_and_taken(runs: Path, tmp_path: Path) -> None:
     name = "tiny/RollingDiscs/0040"
     family = name.partition("/")[2]
-    ratings.write([run(family, solver, 1e-3) for solver in "ab"])
+    publish(runs, [run(family, solver, 1e-3) for solver in "ab"])
     problem = load(name)
     rough, fine = (fclib.solve(problem, tol=tol).solution for tol in (1e-5, 1e-10))
     path = tmp_path / "found.hdf5"
@@ -200,8 +236,8 @@ def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) 
     assert offer(problem, None).exit_code == 1
 
 
-def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Path) -> None:
-    assert "none of its" in invoke("collection", "status", "tiny").output
+def test_status_tells_classes_and_what_they_rest_on(runs: Path, tmp_path: Path) -> None:
+    assert "no published run is of its" in invoke("collection", "status", "tiny").output
     store = tmp_path / "runs.sqlite"
     solvers = ("--solver", "nsgs", "--solver", "auto")
     files = set_index.DATA / "tiny"
@@ -211,7 +247,9 @@ def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Pat
         *("--tol", 1e-8, "--time-limit", 5, "--store", store),
     )
     assert done.exit_code in (0, 1), done.output
-    done = invoke("collection", "status", "tiny", "--add", store)
+    done = invoke("results", "pack", store, "--name", "tiny", "--in", runs)
+    assert done.exit_code == 0, done.output
+    done = invoke("collection", "status", "tiny")
     assert done.exit_code == 0, done.output
     assert "to 1e-08 within 5 s of CPU a run, by 2 solvers (auto, nsgs" in done.output
     rows = [
@@ -221,10 +259,6 @@ def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Pat
     found = {row["problem"]: row["class"] for row in rows}
     assert found["tiny/Wall/0003"] == "easy"
     assert found["tiny/FourBar/0150"] == "not run"
-    # added twice, it is the same
-    text = (results / "runs.csv").read_text()
-    assert invoke("collection", "status", "tiny", "--add", store).exit_code == 0
-    assert (results / "runs.csv").read_text() == text
     done = invoke("collection", "status", "tiny/Wall/9999")
     assert done.exit_code == 1
     assert "there is no such problem" in done.output
@@ -246,7 +280,9 @@ def test_families_without_states_have_members_too() -> None:
 @there
 def test_stored_solutions_have_the_errors_that_are_said() -> None:
     digests = {
-        digest[: ratings.DIGITS]: name for name, digest in ratings.members("standard").items()
+        digest[: ratings.DIGITS]: name
+        for own in ("standard", "hard", "open")
+        for name, digest in ratings.members(own).items()
     }
     stored = sorted((ratings.folder() / "solutions").glob("*.npz"))
     known_ones = [path for path in stored if path.stem in digests]

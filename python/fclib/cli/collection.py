@@ -17,7 +17,6 @@ from fclib import collections
 from fclib._judge import TOLERANCE
 from fclib._regular import regular
 from fclib._verdicts import CLASSES
-from fclib.bench import Store
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -484,9 +483,6 @@ def status(
         Rating | None, typer.Option("--class", help="Each problem of one class.")
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Each problem.")] = False,
-    stores: Annotated[
-        list[Path] | None, typer.Option("--add", help="A store of fclib bench: take its runs in.")
-    ] = None,
     target: Annotated[
         Path | None,
         typer.Option(
@@ -497,8 +493,8 @@ def status(
 ) -> None:
     """Show which problems are easy, hard or open.
 
-    The classes follow from stored runs of campaigns, which the first line names. Of open problems
-    the command shows the best error known, and who found it.
+    The classes follow from the published runs (fclib results), which the first line names. Of open
+    problems the command shows the best error known, and who found it.
     """
     try:
         if name.count("/") == 2:
@@ -506,15 +502,6 @@ def status(
             return
         if target is not None:
             usage_error(ValueError("--out takes one problem: SET/FAMILY/NUMBER"))
-        if stores:
-            digests = {
-                digest: member.partition("/")[2] for member, digest in ratings.members(name).items()
-            }
-            count = 0
-            for path in stores:
-                with Store(path, create=False) as store:
-                    count += ratings.add(store.results(start="cold"), digests)
-            err.print(f"{count} runs taken in", highlight=False)
         rows, basis = ratings.ratings_of(name)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
@@ -528,7 +515,8 @@ def status(
         return
     if basis is None:
         fail(
-            f"{name}: none of its {len(rows)} problems was run; --add takes a store of fclib bench"
+            f"{name}: no published run is of its {len(rows)} problems; the package fclib-results"
+            " has the runs, and fclib results pack adds those of a store"
         )
     out.print(f"Classes {basis}", highlight=False)
     if only is not None or every:
@@ -612,7 +600,7 @@ def accept(
     """Take in a better solution of an open problem.
 
     It is judged on the collection's own problem. It must be better than the best solution known. It
-    is stored in the package of stored states, with a row in its table: commit both.
+    is stored in the package of stored states: commit it.
     """
     report = Report(as_json)
     for path in files:

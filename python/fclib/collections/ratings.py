@@ -1,13 +1,15 @@
-"""The class of problems: easy, hard or open, by stored runs and known solutions.
+"""The class of problems: easy, hard or open, by published runs and known solutions.
 
-In the data package `fclib-collection`, beside the trajectories:
+The runs are those of the package `fclib-results` (`fclib.results`): cold, to TOLERANCE by both
+merits. The best solutions of open problems that came from elsewhere lie in the package
+`fclib-collection`, beside the trajectories:
 
-    results/runs.csv                        a row for each run of a campaign, and for each solution
-    results/solutions/DIGEST.npz            r and l of the best solution of an open problem
+    results/solutions/DIGEST.npz            r and l, the finder, the error and the date
 
-The digest of its data identifies a problem, whatever its name and however many sets have it; 16 of
-its digits are stored. Only runs to TOLERANCE have a vote, with the newest version of each
-solver, at one limit of CPU time: the limit of most runs of the problem's family.
+The digest of its data identifies a problem, whatever its name and however many sets have it. Only
+runs with the newest version of each solver have a vote, at one limit of CPU time: the limit of most
+runs of the problem's family. Of runs on renumbered copies the median counts, of two the better one,
+as in `fclib.bench.comparison`.
 
 easy    more than half of the solvers that take such problems solved it
 hard    at most half of them solved it
@@ -21,25 +23,24 @@ Runs at another limit have no vote, but a problem that they solved is not open.
 
 from __future__ import annotations
 
-import csv
 import functools
 import io
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core, _digest, scenes
+from fclib import _core, _digest, _stored, scenes
 from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, published, set_index, trajectory
 
 TOLERANCE: Final = 1e-8
-DIGITS: Final = 16  # digits of a digest that are stored
+DIGITS: Final = 16  # digits of a digest that name a solution
 TAKEN: Final = "taken"  # the status of a solution that came from elsewhere
 BETTER: Final = 0.9  # a new solution must reach so many times the best error known
 FOLDER: Final = "results"
@@ -52,10 +53,9 @@ class RatingError(ValueError):
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a campaign, or an accepted solution; a row of runs.csv."""
+    """A published run, or an accepted solution."""
 
-    problem: str  # FAMILY/NUMBER, for readers
-    digest: str  # digest of its data
+    digest: str  # the first DIGITS of the digest of its problem's data
     solver: str  # or the finder of the solution, and the way
     version: str  # version of the solver; empty for a solution
     limit: float | None  # [s] of CPU time
@@ -109,7 +109,7 @@ class Basis:
         )
 
 
-# ---- the table
+# ---- the runs
 
 
 def folder() -> Path:
@@ -121,59 +121,40 @@ def folder() -> Path:
 
 
 def runs() -> tuple[Run, ...]:
-    """All stored runs. Raises RatingError, OSError."""
-    path = folder() / "runs.csv"
-    return _read(path, path.stat().st_mtime_ns) if path.is_file() else ()
+    """All runs that are published here, and all accepted solutions.
 
-
-@functools.lru_cache(maxsize=1)
-def _read(path: Path, _changed: int) -> tuple[Run, ...]:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows: list[dict[str, Any]] = list(csv.DictReader(file))
-    for row in rows:
-        row |= {name: float(row[name]) if row[name] else None for name in NUMBERS}
-    return tuple(Run(**row) for row in rows)
-
-
-NUMBERS: Final = ("limit", "error", "cpu")
-
-
-def write(rows: Iterable[Run]) -> Path:
-    """Store all runs, in order; the file is whole, or the old one. RatingError, OSError."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Run)])
-    for row in sorted(set(rows), key=place_of):
-        values = asdict(row)
-        numbers = {k: "" if values[k] is None else f"{values[k]:.6g}" for k in NUMBERS}
-        writer.writerow((values | numbers).values())
-    path = folder() / "runs.csv"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    catalog.replace_file(path, lambda beside: beside.write_text(text.getvalue(), encoding="utf-8"))
-    return path
-
-
-def place_of(run: Run) -> tuple[Any, ...]:
-    """The sort key of runs: no two of the table have the same."""
-    return run.problem, run.digest, run.solver, run.date, run.limit or 0.0, run.version
-
-
-def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> int:
-    """Add the runs of campaigns to the table. Return the number taken.
-
-    A run of the same solver in the same version at the same limit is replaced.
-
-    Args:
-        results: rows of the view `results` from stores of the bench.
-        problems: FAMILY/NUMBER by digest, for the problems wanted.
+    Raises:
+        RatingError: pyarrow is missing, or a part is damaged.
+        OSError: a file cannot be read.
     """
-    new: dict[tuple[Any, ...], Run] = {}
-    for row in results:
-        if row["tol"] != TOLERANCE or row["hash"] not in problems or row["merit"] != "both":
-            continue
+    where = _stored.published_runs()
+    parts = sorted(where.glob("*.parquet")) if where is not None else []
+    found = tuple(run for path in parts for run in _runs_of(path))
+    if published.root() is None:
+        return found
+    return found + tuple(_run_of(path) for path in sorted((folder() / "solutions").glob("*.npz")))
+
+
+# of a part of the published runs
+COLUMNS: Final = ("hash", "solver", "version", "time_limit", "status", "error", "cpu_s", "started")
+
+
+@functools.lru_cache
+def _runs_of(path: Path) -> tuple[Run, ...]:
+    """The runs of a part; those that differ by their copy or repeat alone are one."""
+    try:
+        pa = catalog.arrow()
+        only = [("tol", "=", TOLERANCE), ("merit", "=", "both"), ("start", "=", "cold")]
+        rows = pa.parquet.read_table(path, columns=[*COLUMNS], filters=only).to_pylist()
+    except ImportError as missing:
+        raise RatingError(str(missing)) from None
+    except (pa.ArrowException, KeyError) as wrong:
+        reason = str(wrong).splitlines()[0]
+        raise RatingError(f"{path}: cannot be read as published runs: {reason}") from None
+    found: dict[tuple[Any, ...], list[Run]] = defaultdict(list)
+    for row in rows:
         error = row["error"]
         run = Run(
-            problem=problems[row["hash"]],
             digest=row["hash"][:DIGITS],
             solver=row["solver"],
             version=row["version"],
@@ -183,14 +164,26 @@ def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> in
             cpu=row["cpu_s"],
             date=datetime.fromtimestamp(row["started"], timezone.utc).date().isoformat(),
         )
-        new[identity(run)] = run
-    write([*(run for run in runs() if identity(run) not in new), *new.values()])
-    return len(new)
+        found[run.digest, run.solver, run.version, run.limit].append(run)
+    return tuple(map(_median, found.values()))
 
 
-def identity(run: Run) -> tuple[Any, ...]:
-    """Two runs with this key are the same."""
-    return run.digest, run.solver, run.version, run.limit
+def _median(same: list[Run]) -> Run:
+    """Of runs that differ by their copy alone the median, with the least error of all."""
+    same.sort(key=lambda run: (not run.solved, run.cpu or 0.0))
+    errors = [run.error for run in same if run.error is not None]
+    return replace(same[(len(same) - 1) // 2], error=min(errors, default=None))
+
+
+def _run_of(path: Path) -> Run:
+    """An accepted solution as a run without a limit."""
+    finder = _finder_of(path)
+    return Run(path.stem, finder["by"], "", None, TAKEN, finder["error"], None, finder["date"])
+
+
+def _finder_of(path: Path) -> dict[str, Any]:
+    with np.load(path) as arrays:
+        return dict(json.loads(str(arrays["origin"])))
 
 
 # ---- the classes
@@ -378,9 +371,6 @@ def accept_solution(path: Path, by: str, name: str | None = None) -> tuple[str, 
         )
     date = datetime.now(timezone.utc).date().isoformat()
     store_solution(own, row.digest, solution, {"by": by, "error": error, "date": date})
-    family = name.partition("/")[2]
-    new = Run(family, row.digest[:DIGITS], by, "", None, TAKEN, error, None, date)
-    write([*runs(), new])
     return name, error, best
 
 

@@ -11,9 +11,10 @@ The parts lie in the package `fclib-results`, installed beside this one, or in `
 checkout.
 """
 
+from fclib._stored import published_runs as folder
 from fclib.results.beside import BesideError, Joined, alone, beside
 from fclib.results.leaders import leaders
-from fclib.results.shards import Shard, ShardError, folder, pack, rows_of, shards, unpack, verify
+from fclib.results.shards import Shard, ShardError, pack, rows_of, shards, unpack, verify
 from fclib.results.submission import judged, submit
 
 __all__ = [

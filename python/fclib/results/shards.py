@@ -8,7 +8,6 @@ solutions of a sample: the columns of `VECTORS`, doubles in little endian.
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import re
@@ -26,9 +25,6 @@ from fclib.bench.store import LONG, Store
 from fclib.bench.table import TEXTS, WHOLE
 from fclib.collections.catalog import arrow, replace_file, sha256
 
-PACKAGE: Final = "fclib_results"
-IN_PLACE: Final = Path(__file__).resolve().parents[3] / "results" / PACKAGE
-FOLDER: Final = "runs"
 ABOUT: Final = b"fclib.results"  # key of the metadata
 VERSION: Final = 1
 DIGITS: Final = 16  # digits of the file's SHA-256 in its name
@@ -65,14 +61,6 @@ class Shard:
         """The digits of its content that its name has."""
         found = PART.fullmatch(self.path.name)
         return found[2] if found else ""
-
-
-def folder() -> Path | None:
-    """The folder of the published parts; None if there is none."""
-    if IN_PLACE.is_dir():
-        return IN_PLACE / FOLDER
-    spec = importlib.util.find_spec(PACKAGE)
-    return Path(spec.origin).parent / FOLDER if spec is not None and spec.origin else None
 
 
 def shards(where: Path) -> list[Shard]:

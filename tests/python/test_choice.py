@@ -259,6 +259,30 @@ def test_open_hard_and_unmeasured_ones_by_name() -> None:
     assert choice.set[4] == choice.set[6] == ""
 
 
+def test_what_standard_leaves_and_half_solve_is_run_for_longer_and_hard() -> None:
+    rows = [candidate(f"a/A{k}/0000") for k in range(6)]
+    ran(rows[0], 1)  # difficult
+    for row, solved in zip(rows[1:], (4, 4, 4, 5, 8), strict=True):
+        ran(row, solved)
+    rule = select.Rule(standard=2, clusters=2, difficult=0)
+    # which are open is known first
+    assert select.for_longer(rows, rule) == [0]
+    ran(rows[0], 2, limit=60.0)
+    chosen = select.choose(rows, rule)
+    left = [k for k in (1, 2, 3) if not chosen.set[k]]
+    assert left
+    assert select.for_longer(rows, rule) == [0, *left]
+    assert all(chosen.why[k].endswith("; not run with a limit of 60 s") for k in left)
+    # `standard` stays as it is, whatever these runs give
+    ran(rows[left[0]], 4, limit=60.0)
+    for k in left[1:]:
+        ran(rows[k], 5, limit=60.0)
+    again = select.choose(rows, rule)
+    assert again.of("standard") == chosen.of("standard")
+    assert left[0] in again.of("hard")
+    assert not set(left[1:]) & set(again.of("hard"))
+
+
 def test_the_hardest_come_first_and_six_of_a_family() -> None:
     rows = [ran(ran(candidate(f"a/A/{k:04d}"), 0), 1, 60.0, cost=1.0 + k) for k in range(8)]
     rows += [ran(ran(candidate("b/B/0000"), 0), 2, 60.0), ran(candidate("c/C/0000"), 5)]

@@ -18,6 +18,8 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import results
+from fclib.collections import set_index
+from fclib.collections.set_index import Choice
 from workshop.tables import _results, published
 
 PLAN = {
@@ -137,6 +139,38 @@ def test_the_page_is_made_of_parts(
             rows = list(csv.DictReader(file))
         assert columns <= rows[0].keys()
         assert {row["set"] for row in rows} == {"faf2018", "other"}
+
+
+def test_a_chosen_set_has_the_runs_that_chose_it(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of its own problems alone, with the solvers of all parts that have them."""
+    monkeypatch.setenv("FCLIB_CACHE", str(run / "cache"))
+    plan = {**PLAN, "name": "matrix", "solvers": ["psor"]}
+    bench.run_campaign(bench.Campaign.of(plan), tmp_path / "matrix.sqlite")
+    for name, store in (("candidates", run / "small"), ("matrix", tmp_path / "matrix")):
+        with bench.Store(store.with_suffix(".sqlite")) as opened:
+            results.pack(opened, tmp_path / "parts", name, "fast")
+            digests = sorted({row["hash"] for row in opened.table()})
+    own = [Choice("Chain", {}, 0, k, k, digest) for k, digest in enumerate(digests[:3])]
+    monkeypatch.setattr(set_index, "choices", lambda name: own if name == "standard" else ())
+    parts = results.shards(tmp_path / "parts")
+    sources = published.sources(published.by_name(parts))
+    assert sources == {"standard": parts}
+    with results.alone([part.path for part in parts]) as joined:
+        one = published.set_of("standard", parts, joined)
+        none = published.set_of("hard", parts, joined)
+    assert none is None
+    assert one is not None
+    assert set(one.every.solvers) == {"nsgs", "apgd", "nsn-ac", "psor"}
+    rows = published.matrix_rows(one, 1e-8)
+    assert [(row["family"], row["problems"]) for row in rows] == [("Chain", 3), ("all", 3)]
+    assert rows[0]["psor"] <= 3
+    # once it has parts of its own, these count
+    assert list(published.sources({"standard": parts, "candidates": parts})) == [
+        "standard",
+        "candidates",
+    ]
 
 
 def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:

@@ -398,9 +398,10 @@ def families(assembled: bool) -> list[Any]:
     """
     found: dict[str, str] = {}
     for own in (*set_index.sets()["standard"], *set_index.sets()["extended"]):
-        found.setdefault(own.partition("/")[2], own)
-    del found["Chute4000"], found["ElasticCubesx20"]
-    found = {name: own for name, own in found.items() if not own.startswith("simulators/")}
+        found.setdefault(set_index.kind_of(own), own)
+    recorded = {own.partition("/")[2] for own in set_index.sets()["simulators"]}
+    for name in ("Chute4000", "ElasticCubesx20", *recorded):
+        del found[name]
     from fclib import scenes
 
     simulated = scenes.families()
@@ -416,10 +417,10 @@ def a_problem(own: str) -> tuple[Any, Any, Any]:
     from fclib.collections import trajectory
 
     plan = set_index.plan_of(own)
-    if plan.trajectory is not None:
-        states = trajectory.read(plan.trajectory)
+    states = trajectory.read(plan.trajectory) if plan.trajectory is not None else None
+    if states is not None and states.handed is None:
         return states.problem(0).problem, states.model, states.position[0]
-    chosen: Any = scenes.get(own.partition("/")[2])
+    chosen: Any = scenes.get(set_index.kind_of(own))
     scene = chosen(**getattr(chosen, "small", {})).scene(seed=0)
     step = next(s for s in simulate.simulate(scene, 1000, tol=1e-4) if s.problem.nc)
     contacts, bodies = simulate.geometry_of(step.model, step.contacts)

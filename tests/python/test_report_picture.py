@@ -109,8 +109,8 @@ def test_every_problem_has_a_small_picture(tmp_path: Path) -> None:
     from fclib import collections
 
     plans = []
-    for name in ("Arch", "ManySolutions", "LocalProblems"):
-        plan = set_index.plan_of(f"standard/{name}")
+    for name in ("standard/Arch", "existence/ManySolutions", "standard/LocalProblems"):
+        plan = set_index.plan_of(name)
         plans.append(plan.only([int(plan.numbers()[0])]))
     collections.build(plans, tmp_path / "collection", pictures=False)
     build_site(None, tmp_path / "site", tmp_path / "collection", views=0)

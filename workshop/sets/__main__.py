@@ -99,10 +99,12 @@ def measure(
         return
     try:
         difficulty.run(folder, select.SHORT, jobs)
-        count = difficulty.link_difficult(folder, rule)
-        out.print(difficulty.needed(folder, select.LONG, count), highlight=False)
-        if count:
-            difficulty.run(folder, select.LONG, jobs)
+        # first the difficult ones: `standard` follows from them, and `hard` from what it leaves
+        for _ in range(2):
+            count = difficulty.link_difficult(folder, rule)
+            out.print(difficulty.needed(folder, select.LONG, count), highlight=False)
+            if count:
+                difficulty.run(folder, select.LONG, jobs)
     except (subprocess.CalledProcessError, *difficulty.FAULTS) as error:
         fail(str(error))
 

@@ -3,7 +3,7 @@
     DIR/candidates.csv        a row for each candidate (select.py)
     DIR/costs.csv             CPU of each family: its simulation, and its rows
     DIR/problems/FAMILY/      a file for each candidate that is measured
-    DIR/difficult/FAMILY/     links to those that few solve within the shorter limit
+    DIR/difficult/FAMILY/     links to those that are run under the longer limit
     DIR/difficulty.sqlite, DIR/difficulty-long.sqlite     the stores of both campaigns
 
 Each part goes on after a kill.
@@ -185,15 +185,14 @@ def measured(folder: Path) -> list[dict[str, Any]]:
 
 
 def link_difficult(folder: Path, rule: select.Rule) -> int:
-    """Link the problems that few solve within the shorter limit. Return their number."""
+    """Link the problems that are run under the longer limit. Return their number."""
     links = folder / "difficult"
     shutil.rmtree(links, ignore_errors=True)
-    count = 0
-    for row in measured(folder):
-        path = path_of(folder, row)
-        if path.is_file() and select.is_difficult(row, rule):
-            link = links / path.parent.name / path.name
-            link.parent.mkdir(parents=True, exist_ok=True)
-            link.symlink_to(path.resolve())
-            count += 1
-    return count
+    rows = measured(folder)
+    paths = [path_of(folder, rows[k]) for k in select.for_longer(rows, rule)]
+    paths = [path for path in paths if path.is_file()]
+    for path in paths:
+        link = links / path.parent.name / path.name
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(path.resolve())
+    return len(paths)

@@ -13,8 +13,9 @@ without the problems and without a run, and equal tables give equal choices.
    clusters as it can, within the bounds of `Rule`. If a lower bound cannot be met together with the
    others, as little as possible is lacking, and it is told. Among equal choices it takes problems
    nearest to the middles of their clusters.
-3. `hard`: at most a quarter of the solvers solve it within the longer limit, or none does and
-   somebody else has. Those that the smallest share solves come first, then the slowest.
+3. `hard`: of what `standard` leaves, at most half of the solvers solve it within the longer limit,
+   or none does and somebody else has. Those that the smallest share solves come first, then the
+   slowest.
 4. `open`: nobody has solved it.
 """
 
@@ -83,6 +84,7 @@ class Rule:
     few: float = 0.25  # a problem is difficult if a smaller share of the solvers solves it
     difficult: int = 30  # least number of such problems in standard
     difficult_share: float = 0.25  # and their largest share: the others are for `hard`
+    hard_share: float = 0.5  # a problem is hard if at most this share of the solvers solves it
     quick: float = 0.01  # [s] a problem is quick if all solvers solve it within this time
     quick_share: float = 0.1  # largest share of them
     balance: float = 0.1  # each solver but the best and the worst solves and fails so many
@@ -275,7 +277,7 @@ def share_solved(row: Row, limit: float) -> float | None:
 
 
 def is_difficult(row: Row, rule: Rule) -> bool:
-    """Whether few solvers solve it within the shorter limit; then it is run under the longer."""
+    """Whether few solvers solve it within the shorter limit."""
     share = share_solved(row, SHORT)
     return share is not None and share < rule.few
 
@@ -318,18 +320,45 @@ def choose(rows: Sequence[Row], rule: Rule) -> Chosen:
     closed = [k for k in stay if not is_open(rows[k])]
     for k in standard(rows, closed, rule, chosen):
         chosen.set[k] = "standard"
-    few = [k for k in closed if not chosen.set[k] and is_hard(rows[k], rule)]
-    take(rows, few, "hard", rule.hard, rule, chosen)
+    left = [k for k in closed if not chosen.set[k] and may_be_hard(rows[k], rule)]
+    for k in left:
+        if share_solved(rows[k], LONG) is None:
+            why[k] += f"; not run with a limit of {LONG:g} s"
+    take(rows, [k for k in left if is_hard(rows[k], rule)], "hard", rule.hard, rule, chosen)
     take(rows, [k for k in stay if is_open(rows[k])], "open", None, rule, chosen)
     if (lost := rule.hard - len(chosen.of("hard"))) > 0:
         chosen.lacking.append(f"hard: {lost} of {rule.hard} problems")
     return chosen
 
 
+def may_be_hard(row: Row, rule: Rule) -> bool:
+    """Whether few enough solve it within the shorter limit; then it is run under the longer."""
+    share = share_solved(row, SHORT)
+    return share is not None and share <= rule.hard_share
+
+
 def is_hard(row: Row, rule: Rule) -> bool:
-    """Whether few solvers solve it within the longer limit."""
+    """Whether few enough solve it within the longer limit."""
     share = share_solved(row, LONG)
-    return is_difficult(row, rule) and share is not None and share <= rule.few
+    return share is not None and share <= rule.hard_share
+
+
+def for_longer(rows: Sequence[Row], rule: Rule) -> list[int]:
+    """The rows that are run under the longer limit.
+
+    First those that few solve: it says which are open. `standard` follows from that; then also
+    those that it leaves and that may be hard.
+    """
+    first = [k for k, row in enumerate(rows) if is_difficult(row, rule)]
+    if not first or any(share_solved(rows[k], LONG) is None for k in first):
+        return first
+    chosen = choose(rows, rule)
+    left = [
+        k
+        for k, row in enumerate(rows)
+        if not chosen.set[k] and not is_difficult(row, rule) and may_be_hard(row, rule)
+    ]
+    return sorted(first + left)
 
 
 def take(

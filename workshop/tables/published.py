@@ -20,7 +20,7 @@ import math
 import textwrap
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +34,7 @@ from fclib.bench import comparison, plots, profiles
 from fclib.bench.calibration import calibration_in
 from fclib.bench.comparison import Array, Costs, odds, words_in
 from fclib.bench.table import Table
+from fclib.collections import set_index
 from workshop.tables import _results
 
 Row: TypeAlias = dict[str, Any]
@@ -58,11 +59,19 @@ OWN: Final = {
     "ACLM-NSGS-FP-VI": "siconos:aclmfp",
 }
 BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
+# sets that were chosen from runs, and the parts that have these, unless they have their own
+LISTS: Final = {
+    "standard": ("candidates", "matrix"),
+    "hard": ("candidates-long",),
+    "open": ("candidates-long",),
+}
 # how the problems of a set were taken, if that favours a solver
 TAKEN: Final = {
-    "candidates-long": "The problems of `candidates-long` are those that fewer than a quarter of "
-    "the solvers of `candidates` solve within its limit. `auto` was not among these solvers, so "
-    "this choice favours it: it shows what is left for all, and not by how much `auto` is better.",
+    "candidates-long": "`standard`, `hard` and `open` [were chosen]"
+    "(collection.md#a-set-to-benchmark-with) by the runs of `candidates` and of "
+    "`candidates-long`, whose problems few of the solvers of `candidates` solve within its limit. "
+    "`auto` was not among these solvers. So `hard` favours it: it shows what is left for all, and "
+    "not by how much `auto` is better.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {
@@ -103,20 +112,18 @@ def main() -> None:
     parts = results.shards(folder) if folder else []
     if not parts:
         raise SystemExit("no runs are published here")
-    groups: dict[str, list[results.Shard]] = defaultdict(list)
-    for part in parts:
-        groups[part.name].append(part)
+    groups = by_name(parts)
     facts = facts_of(own.catalog) if own.catalog else {}
     page: list[str] = []
     with ExitStack() as stack:
         sets = []
-        for name, shards in sorted(groups.items()):
+        for name, shards in sorted(sources(groups).items()):
             joined = stack.enter_context(results.alone([shard.path for shard in shards]))
             if name == SEQUENCES:
                 rows = profiles.load(joined.path, start=None)
                 page += table("published-warm", warm(joined.path, rows), "Warm against cold", "")
-                continue
-            sets.append(set_of(name, shards, joined))
+            elif one := set_of(name, shards, joined):
+                sets.append(one)
         page = [*of_sets(sets, groups, facts), *(["## Warm or cold?", "", *page] if page else [])]
         if own.paper:
             page += [part for one in sets if one.name == PAPER for part in of_paper(one, own.paper)]
@@ -124,9 +131,35 @@ def main() -> None:
     print(PAGE)
 
 
-def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set:
-    """The runs of a set, gathered."""
+def by_name(parts: Iterable[results.Shard]) -> dict[str, list[results.Shard]]:
+    """The parts of each name."""
+    groups: dict[str, list[results.Shard]] = defaultdict(list)
+    for part in parts:
+        groups[part.name].append(part)
+    return groups
+
+
+def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[results.Shard]]:
+    """The sets that the parts have runs of, each with its parts."""
+    found = {
+        name: [part for source in names for part in groups.get(source, ())]
+        for name, names in LISTS.items()
+        if name not in groups
+    }
+    used = {source for name, names in LISTS.items() if found.get(name) for source in names}
+    found |= {name: list(own) for name, own in groups.items() if name not in used}
+    return {name: own for name, own in found.items() if own}
+
+
+def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
+    """The runs of a set, gathered; None if there is none."""
     rows = profiles.load(joined.path)
+    if name in LISTS:
+        own = {choice.digest for choice in set_index.choices(name)}
+        if all(shard.name != name for shard in shards):
+            rows = rows.where(words_in(rows, "hash").is_in(own))
+    if not len(rows):
+        return None
     every = profiles.gather(rows)
     return Set(name, shards, rows, every, comparison.compared(every), str(joined))
 
@@ -178,6 +211,16 @@ def of_sets(
                      "The solvers", "; ".join(caption_of(one) for one in sets) + ".")  # fmt: skip
     for one in sets:
         yield from pictures(one)
+    yield from ("## Who solves what?", "")
+    yield from prose(
+        "How many problems of each family a solver solves; of a problem and its renumbered copy, "
+        "the better run counts. A dash: it takes none of them."
+    )
+    for one in sets:
+        for tol in one.tolerances:
+            yield from table(f"published-matrix-{one.name}-{_results.power(tol)}",
+                             matrix_rows(one, tol),
+                             f"{one.name} to {_results.power(tol)}, by family", "")  # fmt: skip
     statuses = sorted({row["status"] for one in sets for row in one.rows if not row["copy"]})
     ends = [status for status in statuses if status != "unsuitable" and not is_solved(status)]
     failures = [row for one in sets for row in failure_rows(one, ends)]
@@ -304,6 +347,23 @@ def solver_rows(one: Set) -> list[Row]:
                     "to best": row["to best"],
                 }
             )
+    return found
+
+
+def matrix_rows(one: Set, tol: float) -> list[Row]:
+    """By family: how many problems each solver solves, of all that it takes."""
+    costs = one.every.at(tol)
+    found = []
+    families: dict[str, list[int]] = defaultdict(list)
+    for k, instance in enumerate(costs.instances):
+        families[instance.family].append(k)
+    solved, takes = np.isfinite(costs.values), ~np.isnan(costs.values)
+    for family, places in [*sorted(families.items()), ("all", list(range(len(costs.instances))))]:
+        row: Row = {"family": family, "problems": len(places)}
+        for k, solver in enumerate(costs.solvers):
+            known = takes[places, k].any()
+            row[solver.partition(" (")[0]] = int(solved[places, k].sum()) if known else "-"
+        found.append(row)
     return found
 
 

@@ -1,65 +1,29 @@
-"""How the solvers did on the set `standard`, by the runs that its classes follow from.
+"""How the solvers did on the set `standard`, by the published runs.
 
     python -m workshop.tables.standard_table [--results]
 
-Nothing is run: the runs are those of campaigns/standard.toml, which `fclib collection status
-standard --add STORE` has taken in (collection/fclib_collection/results/runs.csv). They are compared
-as `fclib profile` compares those of a store (`fclib.bench.comparison`): on the problems that all of
-the solvers take; each family weighs the same.
+Nothing is run. The runs are compared as `fclib profile` compares those of a store
+(`fclib.bench.comparison`): on the problems that all of the solvers take; each family weighs the
+same.
 """
 
 from __future__ import annotations
 
 import argparse
+import time
 from collections import Counter, defaultdict
 from typing import Any
 
 import numpy as np
 
 import fclib
-from fclib import scenes
-from fclib._verdicts import UNSUITABLE
+from fclib import results, scenes
 from fclib.bench import comparison, profiles
-from fclib.collections import ratings
-from workshop.tables import _results
+from fclib.bench.comparison import numbers_in
+from workshop.tables import _results, published
 
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
-
-
-def votes() -> dict[tuple[str, str], ratings.Run]:
-    """The last run of each problem and solver that takes it, at the limit of its family.
-
-    Of the solvers that were tried on the whole set: other campaigns share some of its problems.
-    """
-    rows, basis = ratings.ratings_of(ratings.FIRST)
-    assert basis is not None, "no runs are stored"
-    own = {row.digest[: ratings.DIGITS]: row for row in rows if row.limit is not None}
-    found = {}
-    for run in sorted(ratings.runs(), key=ratings.when):
-        row = own.get(run.digest)
-        if row is not None and run.limit == row.limit:
-            found[row.id, run.solver] = run
-    tried = Counter(solver for _, solver in found)
-    most = max(tried.values())
-    return {key: run for key, run in found.items() if tried[key[1]] == most}
-
-
-def rows_of(runs: dict[tuple[str, str], ratings.Run]) -> list[dict[str, Any]]:
-    """The runs as a store has them."""
-    return [
-        {
-            "solver": solver,
-            "hash": run.digest,
-            "problem": name,
-            "family": name.split("/")[1],
-            "nc": None,
-            "tol": ratings.TOLERANCE,
-            "time_limit": run.limit,
-            "status": run.status,
-            "cpu_s": run.cpu,
-        }
-        for (name, solver), run in runs.items()
-    ]
+SET = "standard"
 
 
 def solver_rows(costs: profiles.Costs, taken: Counter[str]) -> list[dict[str, Any]]:
@@ -96,10 +60,18 @@ def main() -> None:
     parser.add_argument("--results", action="store_true", help="store them in docs/results/")
     arguments = parser.parse_args()
 
-    runs = votes()
-    every = profiles.gather(rows_of(runs))
+    where = results.folder()
+    parts = published.sources(published.by_name(results.shards(where) if where else [])).get(SET)
+    if not parts:
+        raise SystemExit(f"no runs of {SET} are published here")
+    with results.alone([part.path for part in parts]) as joined:
+        one = published.set_of(SET, parts, joined)
+    assert one is not None
+    every = one.every.at(one.every.tolerances[-1])
     costs = every.shared()
-    taken = Counter(solver for (_, solver), run in runs.items() if run.status != UNSUITABLE)
+    taken = Counter(
+        dict(zip(every.solvers, (~np.isnan(every.values)).sum(axis=0).tolist(), strict=True))
+    )
     solvers = solver_rows(costs, taken)
 
     kinds: dict[str, list[int]] = defaultdict(list)
@@ -124,7 +96,8 @@ def main() -> None:
     table.sort(key=lambda row: -row["problems"])
 
     limits = sorted({one.limit for one in every.instances})
-    dates = sorted({run.date for run in runs.values()})
+    started = numbers_in(one.rows, "started")
+    dates = [time.strftime("%Y-%m-%d", time.gmtime(day)) for day in (started.min(), started.max())]
     note = (
         f"{len(every.instances)} problems to 1e-8 by both merits, or proved to have no solution;"
         f" {' or '.join(f'{limit:g}' for limit in limits)} s of CPU a run; of these"

@@ -245,6 +245,7 @@ def test_open_hard_and_unmeasured_ones_by_name() -> None:
     ran(ran(rows[3], 1), 6, limit=60.0)  # most of them
     ran(rows[4], 1)  # not run for long
     ran(rows[5], 5)
+    rows.append(ran(ran(candidate("a/A7/0000"), 0), 0, limit=60.0) | {"proof": "me"})
     rows[0] |= {"best_error": 3e-5, "best_by": "admm, 60 s"}
     choice = select.choose(rows, select.Rule(standard=2, clusters=2, difficult=0))
     assert choice.set[0] == "open"
@@ -257,6 +258,8 @@ def test_open_hard_and_unmeasured_ones_by_name() -> None:
     assert choice.why[4] == "difficult, and not run with a limit of 60 s"
     assert choice.why[6] == "not run with a limit of 10 s"
     assert choice.set[4] == choice.set[6] == ""
+    assert choice.set[7] == "hard"  # and no part of standard, where no solver solves it
+    assert choice.why[7].endswith("; proved to have no solution: me")
 
 
 def test_what_standard_leaves_and_half_solve_is_run_for_longer_and_hard() -> None:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import fclib
 from fclib import _solve, _stored, scenes
-from fclib.analysis import analyze
+from fclib.analysis import analyze, check, read_certificate
 from fclib.cli import app
 
 pytest.importorskip("pyarrow")
@@ -79,6 +79,7 @@ def run(problem: str, solver: str, error: float | None, **more: Any) -> ratings.
     return values | {"error": error, "solver": solver} | more
 
 
+LISTS = ("standard", "hard", "open")
 SECOND, DAY = 1_767_312_000.0, 86_400.0  # [s] 2026-01-02
 
 
@@ -236,6 +237,44 @@ def test_a_better_solution_is_verified_and_taken(runs: Path, tmp_path: Path) -> 
     assert offer(problem, None).exit_code == 1
 
 
+def test_a_proof_that_there_is_no_solution_is_taken(runs: Path, tmp_path: Path) -> None:
+    """It is checked on the collection's own problem, and the problem is no longer open."""
+    name = "existence/Squeezed/0000"
+    rows = [run("Wall/0003", solver, 1e-3) for solver in "ab"]
+    closing = scenes.assemblies()["Squeezed"]().problem(0)
+    publish(runs, [row | {"hash": fclib.digest(closing)} for row in rows])
+    path, proof = tmp_path / "squeezed.hdf5", tmp_path / "proof.json"
+    fclib.write(path, closing)
+    proof.write_text(invoke("analyze", path, "--json").stdout)
+    other = ("--problem", "existence/Squeezed/0001")
+    assert "was not run" in invoke("collection", "take", proof, "--by", "me", *other).output
+    nothing = tmp_path / "nothing.json"
+    nothing.write_text('{"y": [1], "z": []}')
+    done = invoke("collection", "take", nothing, "--by", "me", "--problem", name)
+    assert done.exit_code == 1
+    done = invoke("collection", "take", proof, "--by", "me", "--problem", name)
+    assert done.exit_code == 0, done.output
+    (row,) = [row for row in ratings.ratings_of("existence")[0] if row.id == name]
+    assert (row.rating, row.solved, row.voters) == ("hard", 0, 2)
+    assert row.best is not None
+    assert (row.best.solver, row.best.status, row.best.error) == ("me", "infeasible", None)
+    assert "hard" in invoke("collection", "status", name).output
+
+
+@there
+def test_stored_proofs_prove() -> None:
+    listed = {c.digest[: ratings.DIGITS]: c for own in LISTS for c in set_index.choices(own)}
+    paths = sorted((ratings.folder() / "solutions").glob("*.json"))
+    assert paths
+    for path in paths:
+        y, z, digest = read_certificate(path)
+        assert digest is not None
+        assert digest.startswith(path.stem)
+        chosen = listed[path.stem]
+        own: Any = scenes.assemblies()[chosen.scene or chosen.family](**chosen.parameters)
+        assert check(own.problem(chosen.number), y, z).exact
+
+
 def test_status_tells_classes_and_what_they_rest_on(runs: Path, tmp_path: Path) -> None:
     assert "no published run is of its" in invoke("collection", "status", "tiny").output
     store = tmp_path / "runs.sqlite"
@@ -281,7 +320,7 @@ def test_families_without_states_have_members_too() -> None:
 def test_stored_solutions_have_the_errors_that_are_said() -> None:
     digests = {
         digest[: ratings.DIGITS]: name
-        for own in ("standard", "hard", "open")
+        for own in LISTS
         for name, digest in ratings.members(own).items()
     }
     stored = sorted((ratings.folder() / "solutions").glob("*.npz"))

@@ -23,6 +23,7 @@ from typing import Any, Final
 
 from fclib import _core
 from fclib.bench import Campaign, Store
+from fclib.collections import ratings
 from workshop.sets import candidates, select
 from workshop.tables._results import FOLDER
 
@@ -181,7 +182,8 @@ def measured(folder: Path) -> list[dict[str, Any]]:
     """The rows of the table, with what the stores have."""
     rows = select.read_table(folder / TABLE)
     stores = {limit: store_of(folder, limit) for limit in CAMPAIGNS}
-    return select.measured(rows, {k: path for k, path in stores.items() if path.is_file()})
+    there = {k: path for k, path in stores.items() if path.is_file()}
+    return select.measured(rows, there, [run for run in ratings.runs() if run.limit is None])
 
 
 def link_difficult(folder: Path, rule: select.Rule) -> int:

@@ -16,7 +16,7 @@ without the problems and without a run, and equal tables give equal choices.
 3. `hard`: of what `standard` leaves, at most half of the solvers solve it within the longer limit,
    or none does and somebody else has. Those that the smallest share solves come first, then the
    slowest.
-4. `open`: nobody has solved it.
+4. `open`: nobody has solved it, or proved that it has no solution.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ import numpy.typing as npt
 
 from fclib import _digest, _solve
 from fclib._judge import TOLERANCE, trivial
-from fclib.collections import catalog, trajectory
+from fclib.collections import catalog, ratings, trajectory
 from fclib.collections.build import facts_of, guess_for, item_of
 from fclib.collections.set_index import Choice
 from workshop.sets import features
@@ -51,7 +51,9 @@ SWEEPS: Final = 20  # a problem that nsgs solves with no more sweeps is trivial
 # 160 s: a run of 10 s by eight solvers, and one of its copy by those that solve it.
 MEASURED: Final = 8
 SHORT, LONG = 10.0, 60.0  # [s] of CPU a run, the two limits
-TEXTS: Final = ("problem", "label", "scene", "digest", "law", "left_out", "best_by", "set", "why")
+TEXTS: Final = (
+    *("problem", "label", "scene", "digest", "law", "left_out", "best_by", "proof", "set", "why"),
+)
 SETS: Final = ("standard", "hard", "open")
 # number of contacts from which a class of sizes begins, and its least and largest share
 SIZES: Final = (
@@ -227,7 +229,11 @@ def costs_of(row: Row, limit: float) -> dict[str, float]:
     }
 
 
-def measured(rows: Sequence[Row], stores: Mapping[float, Path]) -> list[dict[str, Any]]:
+def measured(
+    rows: Sequence[Row],
+    stores: Mapping[float, Path],
+    accepted: Iterable[ratings.Run] = (),
+) -> list[dict[str, Any]]:
     """Rows with the costs of all solvers, and the least error known, from stores.
 
     A solver has solved a problem only if it also solves the renumbered copy, and its cost is the
@@ -236,6 +242,7 @@ def measured(rows: Sequence[Row], stores: Mapping[float, Path]) -> list[dict[str
     Args:
         rows: of the candidates.
         stores: the store of the campaign under each limit.
+        accepted: what came from elsewhere: solutions, and proofs that there is none.
 
     Raises:
         StoreError, ProfileError: a store cannot be read, or its runs do not compare.
@@ -262,11 +269,16 @@ def measured(rows: Sequence[Row], stores: Mapping[float, Path]) -> list[dict[str
             error = run["error"]
             if error is not None and error < best.get(run["hash"], (math.inf, ""))[0]:
                 best[run["hash"]] = error, f"{run['solver']}, {limit:g} s"
+    proofs: dict[str, str] = {}
+    for own_run in accepted:
+        if own_run.status == catalog.PROVEN:
+            proofs[own_run.digest] = own_run.solver
     made = []
     for row in rows:
         error, by = best.get(row["digest"], (None, ""))
+        proof = proofs.get(row["digest"][: ratings.DIGITS], "")
         known = {name: costs[row["digest"]].get(name) for name in names}
-        made.append({**row, **known, "best_error": error, "best_by": by})
+        made.append({**row, **known, "best_error": error, "best_by": by, "proof": proof})
     return made
 
 
@@ -283,10 +295,10 @@ def is_difficult(row: Row, rule: Rule) -> bool:
 
 
 def is_open(row: Row) -> bool:
-    """Whether nobody has solved it."""
+    """Whether nobody has solved it, or proved that it has no solution."""
     error = row.get("best_error")
     solved = share_solved(row, SHORT) or share_solved(row, LONG)
-    return not solved and not (error is not None and error <= TOLERANCE)
+    return not (solved or row.get("proof") or (error is not None and error <= TOLERANCE))
 
 
 # ---- the choice
@@ -318,7 +330,8 @@ def choose(rows: Sequence[Row], rule: Rule) -> Chosen:
             why[k] = f"difficult, and not run with a limit of {LONG:g} s"
     stay = [k for k, words in enumerate(why) if not words]
     closed = [k for k in stay if not is_open(rows[k])]
-    for k in standard(rows, closed, rule, chosen):
+    # what only a proof solves tells no solver from another
+    for k in standard(rows, [k for k in closed if not rows[k].get("proof")], rule, chosen):
         chosen.set[k] = "standard"
     left = [k for k in closed if not chosen.set[k] and may_be_hard(rows[k], rule)]
     for k in left:
@@ -395,6 +408,8 @@ def words_of(row: Row) -> str:
         if values := costs_of(row, limit).values():
             solved = sum(map(math.isfinite, values))
             words.append(f"{solved} of {len(values)} solvers in {limit:g} s")
+    if row.get("proof"):
+        words.append(f"proved to have no solution: {row['proof']}")
     if is_open(row) and row.get("best_error") is not None:
         words.append(f"the best error known is {row['best_error']:.1e}, by {row['best_by']}")
     return "; ".join(words)

@@ -547,8 +547,9 @@ def status(
     if open_ones:
         out.print()
         out.print(Rows([record_of(row) for row in open_ones], title="Open"))
+    if known_ones := [row for row in open_ones if row.solution is not None]:
         out.print(
-            f"fclib collection status {open_ones[0].id} --out FILE writes what is known of one"
+            f"fclib collection status {known_ones[0].id} --out FILE writes what is known of one"
         )
 
 
@@ -589,7 +590,12 @@ def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
 
 @app.command("take")
 def accept(
-    files: Annotated[list[Path], typer.Argument(help="FCLIB files with problem and solution.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="FCLIB files with problem and solution; .json: proofs of fclib analyze."
+        ),
+    ],
     by: Annotated[str, typer.Option(help="Who found it, and how: a name, a solver, its version.")],
     name: Annotated[
         str | None,
@@ -597,15 +603,21 @@ def accept(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Take in a better solution of an open problem.
+    """Take in a better solution of an open problem, or a proof that it has none.
 
-    It is judged on the collection's own problem. It must be better than the best solution known. It
+    It is judged on the collection's own problem. It must be better than the best solution known. A
+    proof (fclib analyze FILE --json > proof.json) is checked in exact arithmetic. It
     is stored in the package of stored states: commit it.
     """
     report = Report(as_json)
     for path in files:
         try:
-            taken, error, before = ratings.accept_solution(path, by, name)
+            error: float | None
+            before: float | None
+            if path.suffix == ".json":
+                taken, error, before = ratings.accept_proof(path, by, name), None, None
+            else:
+                taken, error, before = ratings.accept_solution(path, by, name)
         except (ratings.RatingError, fclib.Error, OSError, KeyError) as reason:
             words = str(reason.args[0]) if isinstance(reason, KeyError) else str(reason)
             err.print(f"fclib: {words}", style="red", highlight=False)

@@ -1,10 +1,11 @@
 """The class of problems: easy, hard or open, by published runs and known solutions.
 
 The runs are those of the package `fclib-results` (`fclib.results`): cold, to TOLERANCE by both
-merits. The best solutions of open problems that came from elsewhere lie in the package
-`fclib-collection`, beside the trajectories:
+merits. What came from elsewhere for open problems lies in the package `fclib-collection`, beside
+the trajectories:
 
-    results/solutions/DIGEST.npz            r and l, the finder, the error and the date
+    results/solutions/DIGEST.npz     the best solution: r and l, with finder, error and date
+    results/solutions/DIGEST.json    a proof that there is none (`analysis.Certificate`), likewise
 
 The digest of its data identifies a problem, whatever its name and however many sets have it. Only
 runs with the newest version of each solver have a vote, at one limit of CPU time: the limit of most
@@ -27,7 +28,7 @@ import functools
 import io
 import json
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -35,7 +36,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core, _digest, _stored, scenes
+from fclib import _core, _digest, _stored, analysis, scenes
 from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, published, set_index, trajectory
 
@@ -132,7 +133,8 @@ def runs() -> tuple[Run, ...]:
     found = tuple(run for path in parts for run in _runs_of(path))
     if published.root() is None:
         return found
-    return found + tuple(_run_of(path) for path in sorted((folder() / "solutions").glob("*.npz")))
+    accepted = sorted((folder() / "solutions").glob("*.*"))
+    return found + tuple(_run_of(path) for path in accepted if path.suffix in (".npz", ".json"))
 
 
 # of a part of the published runs
@@ -176,7 +178,10 @@ def _median(same: list[Run]) -> Run:
 
 
 def _run_of(path: Path) -> Run:
-    """An accepted solution as a run without a limit."""
+    """An accepted solution, or a proof that there is none, as a run without a limit."""
+    if path.suffix == ".json":
+        proof = json.loads(path.read_text(encoding="utf-8"))
+        return Run(path.stem, proof["by"], "", None, catalog.PROVEN, None, None, proof["date"])
     finder = _finder_of(path)
     return Run(path.stem, finder["by"], "", None, TAKEN, finder["error"], None, finder["date"])
 
@@ -275,6 +280,8 @@ def rating_of(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]
     found = rating(solved, len(voters))
     if found == "open" and any(run.shows_a_solution for run in mine):
         found = "hard"  # solved at another limit, or by somebody else
+        proof = next((run for run in mine if run.status == catalog.PROVEN), None)
+        best = proof or best
     path = solution_path(digest)
     limit = voters[0].limit if voters else None
     return RatedProblem(
@@ -349,14 +356,8 @@ def accept_solution(path: Path, by: str, name: str | None = None) -> tuple[str, 
     problem, solution = _core.read(path), _core.read_solution(path)
     if solution is None:
         raise RatingError(f"{path}: holds no solution")
-    name = name or recognised(path, problem)
-    rated = {row.id: row for row in ratings_of(name.split("/")[0])[0]}
-    if name not in rated:
-        raise RatingError(f"{name}: there is no such problem")
-    row = rated[name]
-    if row.rating != "open":
-        words = f"is {row.rating}" if row.rating else "was not run"
-        raise RatingError(f"{name}: {words}, and solutions are taken of open problems")
+    row = _open_one(name or recognised(path, problem))
+    name = row.id
     own = problem_of(name)
     if solution.r.size != own.spacedim * own.nc:
         raise RatingError(
@@ -369,9 +370,49 @@ def accept_solution(path: Path, by: str, name: str | None = None) -> tuple[str, 
             f"{name}: the error of this solution is {error:.3g}, and {best:.3g} is known"
             + (f" by {row.best.solver}" if row.best is not None else "")
         )
-    date = datetime.now(timezone.utc).date().isoformat()
-    store_solution(own, row.digest, solution, {"by": by, "error": error, "date": date})
+    store_solution(own, row.digest, solution, {"by": by, "error": error, "date": today()})
     return name, error, best
+
+
+def accept_proof(path: Path, by: str, name: str | None = None) -> str:
+    """Check a proof that an open problem has no solution, and keep it. Return the problem's name.
+
+    It is checked in exact arithmetic on the collection's own problem.
+
+    Args:
+        path: what `fclib analyze --json` prints, or the `record` of an `analysis.Certificate`.
+        by: the finder, and the way.
+        name: SET/FAMILY/NUMBER; by default it is found by the digest that the file has.
+
+    Raises:
+        RatingError: the problem is not open, or none of a list.
+        fclib.Error: the file cannot be read, or proves nothing.
+    """
+    y, z, digest = analysis.read_certificate(path)
+    row = _open_one(name or _listed(path, lambda row: row.digest == digest))
+    own = problem_of(row.id)
+    proof = analysis.check(own, y, z).record(own) | {"by": by, "date": today()}
+    text = json.dumps(proof, sort_keys=True) + "\n"
+    target = solution_path(row.digest).with_suffix(".json")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    catalog.replace_file(target, lambda beside: beside.write_text(text, encoding="utf-8"))
+    return row.id
+
+
+def _open_one(name: str) -> RatedProblem:
+    """An open problem by its name. RatingError if it is not open."""
+    row = next((row for row in ratings_of(name.split("/")[0])[0] if row.id == name), None)
+    if row is None:
+        raise RatingError(f"{name}: there is no such problem")
+    if row.rating != "open":
+        words = f"is {row.rating}" if row.rating else "was not run"
+        raise RatingError(f"{name}: {words}, and solutions are taken of open problems")
+    return row
+
+
+def today() -> str:
+    """The day, as ISO 8601."""
+    return datetime.now(timezone.utc).date().isoformat()
 
 
 def store_solution(
@@ -389,12 +430,21 @@ def store_solution(
 def recognised(path: Path, problem: Any) -> str:
     """The name of a file's problem in a list, by its digest. RatingError if it has none."""
     own = _digest.digest(problem)
+    return _listed(
+        path,
+        lambda row: (
+            row.digest == own or (row.rating == "open" and condenses_to(row.id, problem, own))
+        ),
+    )
+
+
+def _listed(path: Path, is_own: Callable[[RatedProblem], bool]) -> str:
+    """The name of the first problem of a list that is a file's own. RatingError if none is."""
     lists = [name for name in set_index.sets() if set_index.choices(name)]
     # first the set for which classes are made
     for name in sorted(lists, key=lambda name: name != FIRST):
-        rows, _ = ratings_of(name)
-        for row in rows:
-            if row.digest == own or (row.rating == "open" and condenses_to(row.id, problem, own)):
+        for row in ratings_of(name)[0]:
+            if is_own(row):
                 return row.id
     raise RatingError(
         f"{path}: its problem is none of {', '.join(lists)}; name it, if it differs from one by the"

@@ -4,8 +4,8 @@ Every family names its set; its problems are SET/FAMILY/NUMBER. Two kinds of set
 problems of others:
 
 extended      all families that are newer than RT-0444
-standard, hard, open, tiny, rr9118, fclib2024     chosen problems, in folders of their own; data/
-                                                  has the lists
+standard, hard, open, sequences, tiny, rr9118, fclib2024     chosen problems, in folders of their
+              own; data/ has the lists
 
 A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
 stored, its problems never change (`published.py`). A list that was replaced stays in data/older.
@@ -58,6 +58,7 @@ SETS: dict[str, tuple[str, str]] = {
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("1", "what at most half of the solvers solve, beside standard"),
     "open": ("1", "what nobody has solved yet"),
+    "sequences": ("1", "simulations of 100 steps, to start from the step before"),
     "tiny": ("1", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (

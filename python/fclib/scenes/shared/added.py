@@ -21,7 +21,7 @@ from fclib import _entry_points
 GROUP = "fclib.families"
 TEXTS = ("title", "description", "application", "authors", "friction", "collection")
 # sets that consist of problems of other sets (collections/set_index.py)
-LISTS = ("extended", "fclib2024", "hard", "open", "standard", "tiny")
+LISTS = ("extended", "fclib2024", "hard", "open", "sequences", "standard", "tiny")
 FOLDER = re.compile(r"\w[\w.-]*", re.ASCII)  # a set's name is that of a folder, too
 
 

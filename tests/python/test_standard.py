@@ -71,7 +71,7 @@ def test_standard_has_the_states_of_its_list() -> None:
 # ---- how problems stand
 
 
-def run(problem: str, solver: str, error: float | None, **more: Any) -> ratings.Run:
+def run(problem: str, solver: str, error: float | None, **more: Any) -> dict[str, Any]:
     digest = {f"{c.family}/{c.number:04d}": c.digest for c in set_index.choices("tiny")}[problem]
     status = "converged" if error is not None and error <= 1e-8 else "time_limit"
     values: dict[str, Any] = {"version": "1", "time_limit": 1.0, "status": status, "cpu_s": 0.5}

@@ -460,6 +460,9 @@ def methods_of(one: Set) -> dict[str, list[str]]:
 def kind_of(family: str) -> str:
     """The kind of the problems of a family: the set that it is of first."""
     known = scenes.families() | scenes.assemblies()
+    # a list may call it otherwise
+    listed = (set_index.kind_of(f"{name}/{family}") for name in LISTS)
+    family = next((own for own in listed if own in known), family)
     return known[family].collection if family in known else family
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import fclib
-from fclib import results, scenes
+from fclib import results
 from fclib.bench import comparison, profiles
 from fclib.bench.comparison import numbers_in
 from workshop.tables import _results, published
@@ -75,9 +75,8 @@ def main() -> None:
     solvers = solver_rows(costs, taken)
 
     kinds: dict[str, list[int]] = defaultdict(list)
-    families = scenes.families() | scenes.assemblies()
-    for k, one in enumerate(every.instances):
-        kinds[families[one.family].collection].append(k)
+    for k, instance in enumerate(every.instances):
+        kinds[published.kind_of(instance.family)].append(k)
     table: list[dict[str, Any]] = []
     for kind, places in kinds.items():
         # of a kind that only some take, these

@@ -5,7 +5,7 @@
 
 It runs nothing. It reads the parts in results/ and writes docs/results/published-*.csv,
 docs/images/published-*.png and docs/published-results.md, which quotes them. A set is the name of
-its parts. What nothing is published of is left out.
+its parts, or chosen from such runs (LISTS). What nothing is published of is left out.
 
 --paper has the curves of the comparison of 2018, as they were read from its figures: set,
 tolerance, limit_s, solver, tau, share. They are quoted beside ours, set by set. --catalog is a
@@ -117,7 +117,7 @@ def main() -> None:
     page: list[str] = []
     with ExitStack() as stack:
         sets = []
-        for name, shards in sorted(sources(groups).items()):
+        for name, shards in sources(groups).items():
             joined = stack.enter_context(results.alone([shard.path for shard in shards]))
             if name == SEQUENCES:
                 rows = profiles.load(joined.path, start=None)
@@ -148,7 +148,8 @@ def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[res
     }
     used = {source for name, names in LISTS.items() if found.get(name) for source in names}
     found |= {name: list(own) for name, own in groups.items() if name not in used}
-    return {name: own for name, own in found.items() if own}
+    order = (*LISTS, *sorted(found.keys() - LISTS.keys()))
+    return {name: found[name] for name in order if found.get(name)}
 
 
 def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
@@ -209,12 +210,16 @@ def of_sets(
     yield from ("## Who solves how much, and how fast?", "")
     yield from table("published-solvers", [row for one in sets for row in solver_rows(one)],
                      "The solvers", "; ".join(caption_of(one) for one in sets) + ".")  # fmt: skip
-    for one in sets:
+    telling = [
+        one for one in sets if np.isfinite(one.costs.values).any()
+    ]  # `open` is solved by none
+    for one in telling:
         yield from pictures(one)
     yield from ("## Who solves what?", "")
     yield from prose(
-        "How many problems of each family a solver solves; of a problem and its renumbered copy, "
-        "the better run counts. A dash: it takes none of them."
+        "How many problems of each family a solver solves. Here a problem is solved only if its "
+        "renumbered copy is solved too, as the rule of the sets asks. A dash: the solver takes "
+        "none of them."
     )
     for one in sets:
         for tol in one.tolerances:
@@ -229,10 +234,10 @@ def of_sets(
         yield from table("published-failures", failures, "What ends the runs that fail",
                          "Each solver on the problems that it has run and takes.")  # fmt: skip
     yield from ("## Which family of methods for which kind of problem?", "")
-    yield from table("published-kinds", [row for one in sets for row in kind_rows(one)],
+    yield from table("published-kinds", [row for one in telling for row in kind_rows(one)],
                      "The best of each family of methods, by kind of problem",
                      "The best solver is the one that solves most, then the fastest.")  # fmt: skip
-    effects = [row for one in sets for row in effect_rows(one, facts)]
+    effects = [row for one in telling for row in effect_rows(one, facts)]
     if effects:
         yield from ("## What do size, density, rank and conditioning do?", "")
         yield from prose(
@@ -245,7 +250,7 @@ def of_sets(
             "published-effects", effects, "The effect of a fact on a family of methods", ""
         )
     yield from ("## What would the best of all be?", "")
-    yield from table("published-best", [row for one in sets for row in best_rows(one)],
+    yield from table("published-best", [row for one in telling for row in best_rows(one)],
                      "The virtual best, and the best two and three solvers together",
                      "Chosen in hindsight: nobody knows it before.")  # fmt: skip
     yield from ("## What follows?", "")
@@ -253,7 +258,7 @@ def of_sets(
     yield from prose(
         "A statement is carried by the data if its 95 % interval lies on one side of the bound."
     )
-    yield from table("published-conclusions", [row for one in sets for row in conclusions(one)],
+    yield from table("published-conclusions", [row for one in telling for row in conclusions(one)],
                      "Statements, and whether the data carry them", "")  # fmt: skip
 
 
@@ -351,18 +356,22 @@ def solver_rows(one: Set) -> list[Row]:
 
 
 def matrix_rows(one: Set, tol: float) -> list[Row]:
-    """By family: how many problems each solver solves, of all that it takes."""
-    costs = one.every.at(tol)
+    """By family: how many problems each solver solves, with their copies, of those it takes."""
+    solved: dict[tuple[str, str], bool] = {}
+    family: dict[str, str] = {}
+    for row in one.rows:
+        if row["tol"] == tol and row["status"] != "unsuitable":
+            key = row["hash"], row["solver"].partition(" (")[0]
+            solved[key] = solved.get(key, True) and is_solved(row["status"])
+            family[row["hash"]] = set_index.kind_of(f"{one.name}/{row['family']}")
+    solvers = list(dict.fromkeys(solver for _, solver in solved))
     found = []
-    families: dict[str, list[int]] = defaultdict(list)
-    for k, instance in enumerate(costs.instances):
-        families[instance.family].append(k)
-    solved, takes = np.isfinite(costs.values), ~np.isnan(costs.values)
-    for family, places in [*sorted(families.items()), ("all", list(range(len(costs.instances))))]:
-        row: Row = {"family": family, "problems": len(places)}
-        for k, solver in enumerate(costs.solvers):
-            known = takes[places, k].any()
-            row[solver.partition(" (")[0]] = int(solved[places, k].sum()) if known else "-"
+    for name in (*sorted(set(family.values())), ""):
+        own = [digest for digest, of in family.items() if name in ("", of)]
+        row = {"family": name or "all", "problems": len(own)}
+        for solver in solvers:
+            mine = [solved[digest, solver] for digest in own if (digest, solver) in solved]
+            row[solver] = sum(mine) if mine else "-"
         found.append(row)
     return found
 

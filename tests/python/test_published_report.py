@@ -166,11 +166,18 @@ def test_a_chosen_set_has_the_runs_that_chose_it(
     rows = published.matrix_rows(one, 1e-8)
     assert [(row["family"], row["problems"]) for row in rows] == [("Chain", 3), ("all", 3)]
     assert rows[0]["psor"] <= 3
-    # once it has parts of its own, these count
-    assert list(published.sources({"standard": parts, "candidates": parts})) == [
-        "standard",
-        "candidates",
-    ]
+    # parts of its own name come beside these; a run at another limit does not
+    found = published.sources({"other": parts, "standard": parts[:1], "candidates": parts[1:]})
+    assert {name: len(own) for name, own in found.items()} == {"standard": 2, "other": 2}
+    short = {**PLAN, "name": "standard", "solvers": ["bb"], "time_limit": 7.0}
+    bench.run_campaign(bench.Campaign.of(short), tmp_path / "standard.sqlite")
+    with bench.Store(tmp_path / "standard.sqlite") as opened:
+        results.pack(opened, tmp_path / "parts", "standard", "fast")
+    parts = results.shards(tmp_path / "parts")
+    with results.alone([part.path for part in parts]) as joined:
+        one = published.set_of("standard", parts, joined)
+    assert one is not None
+    assert "bb" not in one.every.solvers
 
 
 def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:

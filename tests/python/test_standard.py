@@ -139,14 +139,14 @@ def test_classes_follow_from_runs(runs: Path) -> None:
     assert classes_by_problem()[discs] == "hard"
 
 
-def test_runs_vote_at_the_limit_of_their_family(runs: Path) -> None:
+def test_runs_vote_at_the_limit_of_most_runs(runs: Path) -> None:
+    """So a problem has one class, whatever set it is in."""
     wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
     rows = [run(wall, name, 1e-9) for name in "abcd"]
-    # a family whose runs had longer, and not a vote of one that had less
     rows += [run(kaplas, name, 1e-9 if name == "a" else None, time_limit=10.0) for name in "abc"]
-    rows += [run(kaplas, name, 1e-9, time_limit=1.0) for name in "de"]
-    # of as many runs those that had less
-    rows += [run(discs, "a", 1e-9, time_limit=limit) for limit in (10.0, 1.0)]
+    # of both limits the one at which there are more runs of all problems
+    rows += [run(discs, name, 1e-9, time_limit=10.0) for name in "abc"]
+    rows += [run(discs, "a", None)]
     # a solution that was taken in has no vote, where nothing was run
     bars = load("tiny/FourBar/0150")
     finder = {"by": "me", "error": 1e-9, "date": "2026-01-02"}
@@ -157,20 +157,31 @@ def test_runs_vote_at_the_limit_of_their_family(runs: Path) -> None:
     assert {name: row.limit for name, row in found.items() if row.rating} == {
         wall: 1.0,
         kaplas: 10.0,
-        discs: 1.0,
+        discs: 10.0,
     }
     assert (found[kaplas].rating, found[kaplas].solved, found[kaplas].voters) == ("hard", 1, 3)
+    assert (found[discs].rating, found[discs].solved) == ("easy", 3)
     basis = ratings.ratings_of("tiny")[1]
     assert basis is not None
     assert "within 1 or 10 s of CPU a run, by 4 solvers (a, b, c, d;" in str(basis)
+
+
+def test_a_problem_has_one_class_in_all_sets() -> None:
+    found: dict[str, dict[str, str]] = {}
+    for name in ("standard", "hard", "open", "rr9118", "rt444", "machines", "fclib2024"):
+        for row in ratings.ratings_of(name)[0]:
+            found.setdefault(row.digest, {})[row.id] = row.rating
+    assert not [own for own in found.values() if len(set(own.values())) > 1]
 
 
 def test_of_copies_the_median_counts(runs: Path) -> None:
     """As in a profile; the least error of all is known."""
     rows = [run("Wall/0003", "a", 1e-9, cpu_s=cpu) for cpu in (0.9, 0.1)]
     rows += [run("Wall/0003", "b", error) for error in (2e-3, 3e-9, None)]
-    publish(runs, rows)
-    first, second = ratings.runs()
+    # in whatever parts they are
+    publish(runs, rows[::2])
+    publish(runs, rows[1::2])
+    first, second = sorted(ratings.runs(), key=lambda run: run.solver)
     assert (first.solver, first.cpu, first.solved) == ("a", 0.1, True)
     assert (second.solver, second.error, second.solved) == ("b", 3e-9, False)
     assert classes_by_problem()["Wall/0003"] == "hard"
@@ -187,6 +198,14 @@ def test_a_damaged_part_is_named(runs: Path) -> None:
     done = invoke("collection", "status", "tiny")
     assert done.exit_code == 1
     assert "some.parquet: cannot be read as published runs" in " ".join(done.output.split())
+    (runs / "some.parquet").unlink()
+    path = ratings.folder() / "solutions" / "0123456789abcdef.json"
+    path.parent.mkdir(parents=True)
+    for text in ("", "[]", "{}"):
+        path.write_text(text)
+        done = invoke("collection", "status", "tiny")
+        assert done.exit_code == 1
+        assert "0123456789abcdef.json: is no solution and no proof" in " ".join(done.output.split())
 
 
 def test_a_better_solution_is_verified_and_taken(runs: Path, tmp_path: Path) -> None:
@@ -249,9 +268,13 @@ def test_a_proof_that_there_is_no_solution_is_taken(runs: Path, tmp_path: Path) 
     other = ("--problem", "existence/Squeezed/0001")
     assert "was not run" in invoke("collection", "take", proof, "--by", "me", *other).output
     nothing = tmp_path / "nothing.json"
+    for text in ('{"y": [1], "z": []}', "[" * 100_000):
+        nothing.write_text(text)
+        done = invoke("collection", "take", nothing, "--by", "me", "--problem", name)
+        assert done.exit_code == 1
+        assert "nothing.json" in done.output or "proves nothing" in done.output
     nothing.write_text('{"y": [1], "z": []}')
-    done = invoke("collection", "take", nothing, "--by", "me", "--problem", name)
-    assert done.exit_code == 1
+    assert "name the problem" in invoke("collection", "take", nothing, "--by", "me").output
     done = invoke("collection", "take", proof, "--by", "me", "--problem", name)
     assert done.exit_code == 0, done.output
     (row,) = [row for row in ratings.ratings_of("existence")[0] if row.id == name]
@@ -259,6 +282,25 @@ def test_a_proof_that_there_is_no_solution_is_taken(runs: Path, tmp_path: Path) 
     assert row.best is not None
     assert (row.best.solver, row.best.status, row.best.error) == ("me", "infeasible", None)
     assert "hard" in invoke("collection", "status", name).output
+
+
+def test_a_proof_up_to_a_norm_is_not_taken(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """W is rounded: it proves something of reactions that are not huge."""
+    W = np.eye(6)
+    W[0, 3] = W[3, 0] = -1.0 - 2.0**-52
+    W[0, 1] = W[1, 0] = 1e-15
+    q = np.array([-1.0, 0, 0, -1.0, 0, 0])
+    problem = fclib.LocalProblem(spacedim=3, W=W, q=q, mu=np.ones(2))
+    assert not check(problem, {0: 1, 1: 1}).exact
+    row = ratings.RatedProblem("a/B/0000", "0" * 64, "open", 0, 2, 1.0, None, None)
+    monkeypatch.setattr(ratings, "_open_one", lambda name: row)
+    monkeypatch.setattr(ratings, "problem_of", lambda name: problem)
+    proof = tmp_path / "proof.json"
+    proof.write_text('{"y": [1, 1], "z": []}')
+    with pytest.raises(ratings.RatingError, match="exact proofs are taken"):
+        ratings.accept_proof(proof, "me", "a/B/0000")
 
 
 @there

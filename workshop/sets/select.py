@@ -270,15 +270,22 @@ def measured(
             if error is not None and error < best.get(run["hash"], (math.inf, ""))[0]:
                 best[run["hash"]] = error, f"{run['solver']}, {limit:g} s"
     proofs: dict[str, str] = {}
-    for own_run in accepted:
-        if own_run.status == catalog.PROVEN:
-            proofs[own_run.digest] = own_run.solver
+    taken: dict[str, tuple[float, str]] = {}
+    for run in accepted:
+        if run.status == catalog.PROVEN:
+            proofs[run.digest] = run.solver
+        elif run.error is not None:
+            taken[run.digest] = run.error, run.solver
     made = []
     for row in rows:
-        error, by = best.get(row["digest"], (None, ""))
-        proof = proofs.get(row["digest"][: ratings.DIGITS], "")
+        short = row["digest"][: ratings.DIGITS]
+        none = math.inf, ""
+        error, by = min(best.get(row["digest"], none), taken.get(short, none))
+        proof = proofs.get(short, "")
         known = {name: costs[row["digest"]].get(name) for name in names}
-        made.append({**row, **known, "best_error": error, "best_by": by, "proof": proof})
+        made.append(
+            {**row, **known, "best_error": error if by else None, "best_by": by, "proof": proof}
+        )
     return made
 
 

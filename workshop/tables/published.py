@@ -32,7 +32,7 @@ from fclib import collections, results, scenes
 from fclib._verdicts import is_solved
 from fclib.bench import comparison, plots, profiles
 from fclib.bench.calibration import calibration_in
-from fclib.bench.comparison import Array, Costs, odds, words_in
+from fclib.bench.comparison import Array, Costs, numbers_in, odds, words_in
 from fclib.bench.table import Table
 from fclib.collections import set_index
 from workshop.tables import _results
@@ -59,7 +59,7 @@ OWN: Final = {
     "ACLM-NSGS-FP-VI": "siconos:aclmfp",
 }
 BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
-# sets that were chosen from runs, and the parts that have these, unless they have their own
+# sets that were chosen from runs, and the parts that have these, beside parts of their own name
 LISTS: Final = {
     "standard": ("candidates", "matrix"),
     "hard": ("candidates-long",),
@@ -69,7 +69,7 @@ LISTS: Final = {
 TAKEN: Final = {
     "candidates-long": "`standard`, `hard` and `open` [were chosen]"
     "(collection.md#a-set-to-benchmark-with) by the runs of `candidates` and of "
-    "`candidates-long`, whose problems few of the solvers of `candidates` solve within its limit. "
+    "`candidates-long`, whose problems at most half of the solvers of `candidates` solve. "
     "`auto` was not among these solvers. So `hard` favours it: it shows what is left for all, and "
     "not by how much `auto` is better.",
 }
@@ -142,12 +142,11 @@ def by_name(parts: Iterable[results.Shard]) -> dict[str, list[results.Shard]]:
 def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[results.Shard]]:
     """The sets that the parts have runs of, each with its parts."""
     found = {
-        name: [part for source in names for part in groups.get(source, ())]
+        name: [part for source in (*names, name) for part in groups.get(source, ())]
         for name, names in LISTS.items()
-        if name not in groups
     }
-    used = {source for name, names in LISTS.items() if found.get(name) for source in names}
-    found |= {name: list(own) for name, own in groups.items() if name not in used}
+    used = {source for names in LISTS.values() for source in names}
+    found |= {name: list(own) for name, own in groups.items() if name not in used | found.keys()}
     order = (*LISTS, *sorted(found.keys() - LISTS.keys()))
     return {name: found[name] for name in order if found.get(name)}
 
@@ -157,8 +156,11 @@ def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -
     rows = profiles.load(joined.path)
     if name in LISTS:
         own = {choice.digest for choice in set_index.choices(name)}
-        if all(shard.name != name for shard in shards):
-            rows = rows.where(words_in(rows, "hash").is_in(own))
+        rows = rows.where(words_in(rows, "hash").is_in(own))
+        # at one limit, that of most runs
+        limits, counts = np.unique(numbers_in(rows, "time_limit"), return_counts=True)
+        if limits.size:
+            rows = rows.where(numbers_in(rows, "time_limit") == limits[counts.argmax()])
     if not len(rows):
         return None
     every = profiles.gather(rows)

@@ -465,6 +465,6 @@ def read_certificate(path: str | Path) -> tuple[dict[int, Any], dict[int, Any], 
         ]
     except OSError as error:
         raise _core.FileError(f"{path}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _core.FileError(f"{path}: no certificate: y and z are missing") from None
     return parts[0], parts[1], record.get("digest")

@@ -605,9 +605,9 @@ def accept(
 ) -> None:
     """Take in a better solution of an open problem, or a proof that it has none.
 
-    It is judged on the collection's own problem. It must be better than the best solution known. A
-    proof (fclib analyze FILE --json > proof.json) is checked in exact arithmetic. It
-    is stored in the package of stored states: commit it.
+    Both are judged on the collection's own problem. A solution must be better than the best one
+    known. A proof (fclib analyze FILE --json > proof.json) must be exact. What is taken is stored
+    in the package of stored states: commit it.
     """
     report = Report(as_json)
     for path in files:

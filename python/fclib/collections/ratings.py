@@ -8,14 +8,14 @@ the trajectories:
     results/solutions/DIGEST.json    a proof that there is none (`analysis.Certificate`), likewise
 
 The digest of its data identifies a problem, whatever its name and however many sets have it. Only
-runs with the newest version of each solver have a vote, at one limit of CPU time: the limit of most
-runs of the problem's family. Of runs on renumbered copies the median counts, of two the better one,
-as in `fclib.bench.comparison`.
+runs with the newest version of each solver have a vote, at one limit of CPU time: of the limits at
+which the problem was run, the one that most published runs have. Of runs on renumbered copies the
+median counts, of two the better one, as in `fclib.bench.comparison`.
 
 easy    more than half of the solvers that take such problems solved it
 hard    at most half of them solved it
-open    no run and no accepted solution has an error within TOLERANCE, and no run has
-        proved that there is no solution
+open    no run and no accepted solution has an error within TOLERANCE, and neither a run nor an
+        accepted proof shows that there is no solution
 
 `fclib._verdicts` defines "solved", and the class by the number of solvers.
 
@@ -65,6 +65,7 @@ class Run:
     error: float | None
     cpu: float | None  # [s]
     date: str
+    started: float = 0.0  # [s] since 1970
 
     @property
     def solved(self) -> bool:
@@ -72,7 +73,7 @@ class Run:
         return is_solved(self.status)
 
     @property
-    def shows_a_solution(self) -> bool:
+    def settles(self) -> bool:
         """Whether it is solved, or found too late or elsewhere with an error within TOLERANCE."""
         return self.solved or (self.error is not None and self.error <= TOLERANCE)
 
@@ -86,7 +87,7 @@ class RatedProblem:
     rating: str  # easy, hard or open; empty if it was not run
     solved: int  # number of solvers that solved it
     voters: int  # number of solvers with a vote
-    limit: float | None  # [s] CPU time limit of these, one for a family; None if none was run
+    limit: float | None  # [s] CPU time limit of these; None if none was run
     best: Run | None  # the run with the least error
     solution: Path | None  # file of the best solution
 
@@ -95,7 +96,7 @@ class RatedProblem:
 class Basis:
     """The basis of the classes of a set."""
 
-    limits: tuple[float, ...]  # [s] of CPU time, the limits of its families
+    limits: tuple[float, ...]  # [s] of CPU time, the limits of its problems
     solvers: tuple[str, ...]  # solvers with a vote
     versions: tuple[str, ...]
     dates: tuple[str, str]  # first and last day of the runs
@@ -122,15 +123,15 @@ def folder() -> Path:
 
 
 def runs() -> tuple[Run, ...]:
-    """All runs that are published here, and all accepted solutions.
+    """All runs that are published here, and all that was accepted.
 
     Raises:
-        RatingError: pyarrow is missing, or a part is damaged.
+        RatingError: pyarrow is missing, or a file is damaged.
         OSError: a file cannot be read.
     """
     where = _stored.published_runs()
     parts = sorted(where.glob("*.parquet")) if where is not None else []
-    found = tuple(run for path in parts for run in _runs_of(path))
+    found = _runs_of(tuple(parts))
     if published.root() is None:
         return found
     accepted = sorted((folder() / "solutions").glob("*.*"))
@@ -141,20 +142,11 @@ def runs() -> tuple[Run, ...]:
 COLUMNS: Final = ("hash", "solver", "version", "time_limit", "status", "error", "cpu_s", "started")
 
 
-@functools.lru_cache
-def _runs_of(path: Path) -> tuple[Run, ...]:
-    """The runs of a part; those that differ by their copy or repeat alone are one."""
-    try:
-        pa = catalog.arrow()
-        only = [("tol", "=", TOLERANCE), ("merit", "=", "both"), ("start", "=", "cold")]
-        rows = pa.parquet.read_table(path, columns=[*COLUMNS], filters=only).to_pylist()
-    except ImportError as missing:
-        raise RatingError(str(missing)) from None
-    except (pa.ArrowException, KeyError) as wrong:
-        reason = str(wrong).splitlines()[0]
-        raise RatingError(f"{path}: cannot be read as published runs: {reason}") from None
+@functools.lru_cache(maxsize=2)
+def _runs_of(parts: tuple[Path, ...]) -> tuple[Run, ...]:
+    """The runs of parts; those that differ by their copy or repeat alone are one."""
     found: dict[tuple[Any, ...], list[Run]] = defaultdict(list)
-    for row in rows:
+    for row in (row for path in parts for row in _rows_of(path)):
         error = row["error"]
         run = Run(
             digest=row["hash"][:DIGITS],
@@ -165,9 +157,26 @@ def _runs_of(path: Path) -> tuple[Run, ...]:
             error=None if error is None or not np.isfinite(error) else error,
             cpu=row["cpu_s"],
             date=datetime.fromtimestamp(row["started"], timezone.utc).date().isoformat(),
+            started=row["started"],
         )
         found[run.digest, run.solver, run.version, run.limit].append(run)
     return tuple(map(_median, found.values()))
+
+
+def _rows_of(path: Path) -> list[dict[str, Any]]:
+    """The rows of a part that count."""
+    try:
+        pa = catalog.arrow()
+        only = [("tol", "=", TOLERANCE), ("merit", "=", "both"), ("start", "=", "cold")]
+        rows: list[dict[str, Any]] = pa.parquet.read_table(
+            path, columns=[*COLUMNS], filters=only
+        ).to_pylist()
+    except ImportError as missing:
+        raise RatingError(str(missing)) from None
+    except (pa.ArrowException, KeyError) as wrong:
+        reason = str(wrong).splitlines()[0]
+        raise RatingError(f"{path}: cannot be read as published runs: {reason}") from None
+    return rows
 
 
 def _median(same: list[Run]) -> Run:
@@ -179,16 +188,16 @@ def _median(same: list[Run]) -> Run:
 
 def _run_of(path: Path) -> Run:
     """An accepted solution, or a proof that there is none, as a run without a limit."""
-    if path.suffix == ".json":
-        proof = json.loads(path.read_text(encoding="utf-8"))
-        return Run(path.stem, proof["by"], "", None, catalog.PROVEN, None, None, proof["date"])
-    finder = _finder_of(path)
-    return Run(path.stem, finder["by"], "", None, TAKEN, finder["error"], None, finder["date"])
-
-
-def _finder_of(path: Path) -> dict[str, Any]:
-    with np.load(path) as arrays:
-        return dict(json.loads(str(arrays["origin"])))
+    try:
+        if path.suffix == ".json":
+            proof = json.loads(path.read_text(encoding="utf-8"))
+            return Run(path.stem, proof["by"], "", None, catalog.PROVEN, None, None, proof["date"])
+        with np.load(path) as arrays:
+            finder = json.loads(str(arrays["origin"]))
+        error, date = float(finder["error"]), finder["date"]
+        return Run(path.stem, finder["by"], "", None, TAKEN, error, None, date)
+    except (KeyError, TypeError, ValueError) as wrong:
+        raise RatingError(f"{path}: is no solution and no proof: {wrong}") from None
 
 
 # ---- the classes
@@ -230,16 +239,13 @@ def ratings_of(name: str) -> tuple[list[RatedProblem], Basis | None]:
     for run in runs():
         stored[run.digest].append(run)
     problems = members(name)
-    done: dict[str, Counter[float]] = defaultdict(Counter)
-    for name_, digest in problems.items():
-        limits = [run.limit for run in stored[digest[:DIGITS]] if run.limit is not None]
-        done[name_.rpartition("/")[0]].update(limits)
+    common = Counter(run.limit for own in stored.values() for run in own)
     rows = []
     voting: list[Run] = []
     for name_, digest in problems.items():
         mine = stored[digest[:DIGITS]]
-        counts = done[name_.rpartition("/")[0]]
-        limit = max(counts, key=lambda value: (counts[value], -value), default=None)
+        limits = {run.limit for run in mine if run.limit is not None}
+        limit = max(limits, key=lambda value: (common[value], -value), default=None)
         # the last version of a solver has the vote
         last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
         # an accepted solution has no limit and no vote
@@ -267,9 +273,9 @@ def classes(name: str) -> Mapping[str, str]:
         return {}
 
 
-def when(run: Run) -> str:
+def when(run: Run) -> float:
     """The order of runs: the later one counts."""
-    return run.date
+    return run.started
 
 
 def rating_of(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]) -> RatedProblem:
@@ -278,7 +284,7 @@ def rating_of(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]
     judged = [run for run in mine if run.error is not None]
     best = min(judged, key=lambda run: run.error or 0.0, default=None)
     found = rating(solved, len(voters))
-    if found == "open" and any(run.shows_a_solution for run in mine):
+    if found == "open" and any(run.settles for run in mine):
         found = "hard"  # solved at another limit, or by somebody else
         proof = next((run for run in mine if run.status == catalog.PROVEN), None)
         best = proof or best
@@ -385,14 +391,20 @@ def accept_proof(path: Path, by: str, name: str | None = None) -> str:
         name: SET/FAMILY/NUMBER; by default it is found by the digest that the file has.
 
     Raises:
-        RatingError: the problem is not open, or none of a list.
+        RatingError: the problem is not open, or none of a list; the proof is not exact.
         fclib.Error: the file cannot be read, or proves nothing.
     """
     y, z, digest = analysis.read_certificate(path)
+    if name is None and digest is None:
+        raise RatingError(f"{path}: has no digest of a problem: name the problem")
     row = _open_one(name or _listed(path, lambda row: row.digest == digest))
     own = problem_of(row.id)
-    proof = analysis.check(own, y, z).record(own) | {"by": by, "date": today()}
-    text = json.dumps(proof, sort_keys=True) + "\n"
+    proof = analysis.check(own, y, z)
+    if not proof.exact:
+        raise RatingError(
+            f"{path}: proves it up to reactions of {proof.bound:.1e}, and exact proofs are taken"
+        )
+    text = json.dumps(proof.record(own) | {"by": by, "date": today()}, sort_keys=True) + "\n"
     target = solution_path(row.digest).with_suffix(".json")
     target.parent.mkdir(parents=True, exist_ok=True)
     catalog.replace_file(target, lambda beside: beside.write_text(text, encoding="utf-8"))

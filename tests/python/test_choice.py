@@ -395,6 +395,20 @@ def test_stores_say_who_solves_what_and_the_best_error(tmp_path: Path) -> None:
     assert select.share_solved(found[2], 10.0) is None
 
 
+def test_what_was_accepted_closes_a_problem() -> None:
+    rows = [candidate(f"a/A/{k:04d}") for k in range(3)]
+    runs = [
+        ratings.Run(row["digest"][: ratings.DIGITS], "me", "", None, status, error, None, "")
+        for row, status, error in zip(
+            rows, (ratings.TAKEN, "infeasible"), (1e-12, None), strict=False
+        )
+    ]
+    found = select.measured(rows, {}, runs)
+    assert [select.is_open(row) for row in found] == [False, False, True]
+    assert [row["best_by"] for row in found] == ["me", "", ""]
+    assert [row["best_error"] for row in found] == [1e-12, None, None]
+
+
 def test_campaigns_measure_what_the_rule_reads() -> None:
     for limit, (name, folder) in difficulty.CAMPAIGNS.items():
         campaign = Campaign.read(name)

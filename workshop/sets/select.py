@@ -271,11 +271,11 @@ def measured(
                 best[run["hash"]] = error, f"{run['solver']}, {limit:g} s"
     proofs: dict[str, str] = {}
     taken: dict[str, tuple[float, str]] = {}
-    for run in accepted:
-        if run.status == catalog.PROVEN:
-            proofs[run.digest] = run.solver
-        elif run.error is not None:
-            taken[run.digest] = run.error, run.solver
+    for one in accepted:
+        if one.status == catalog.PROVEN:
+            proofs[one.digest] = one.solver
+        elif one.error is not None:
+            taken[one.digest] = one.error, one.solver
     made = []
     for row in rows:
         short = row["digest"][: ratings.DIGITS]

@@ -396,7 +396,7 @@ def test_stores_say_who_solves_what_and_the_best_error(tmp_path: Path) -> None:
 
 
 def test_what_was_accepted_closes_a_problem() -> None:
-    rows = [candidate(f"a/A/{k:04d}") for k in range(3)]
+    rows = [candidate(f"a/A/{k:04d}", digest=str(k) * 64) for k in range(3)]
     runs = [
         ratings.Run(row["digest"][: ratings.DIGITS], "me", "", None, status, error, None, "")
         for row, status, error in zip(

@@ -70,8 +70,9 @@ TAKEN: Final = {
     "candidates-long": "`standard`, `hard` and `open` [were chosen]"
     "(collection.md#a-set-to-benchmark-with) by the runs of `candidates` and of "
     "`candidates-long`, whose problems at most half of the solvers of `candidates` solve. "
-    "`auto` was not among these solvers. So `hard` favours it: it shows what is left for all, and "
-    "not by how much `auto` is better.",
+    "`auto` and the solvers of `matrix` were not among these. So the sets favour them: a problem "
+    "was taken if some of the others fail on it. They show what is left for all, and who solves "
+    "what, more than by how much `auto` is better.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {

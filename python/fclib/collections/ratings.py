@@ -36,7 +36,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fclib import _core, _digest, _stored, analysis, scenes
+from fclib import _core, _digest, _stored, scenes
 from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, published, set_index, trajectory
 
@@ -394,6 +394,8 @@ def accept_proof(path: Path, by: str, name: str | None = None) -> str:
         RatingError: the problem is not open, or none of a list; the proof is not exact.
         fclib.Error: the file cannot be read, or proves nothing.
     """
+    from fclib import analysis  # which other commands do without
+
     y, z, digest = analysis.read_certificate(path)
     if name is None and digest is None:
         raise RatingError(f"{path}: has no digest of a problem: name the problem")

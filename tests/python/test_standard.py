@@ -206,6 +206,13 @@ def test_a_damaged_part_is_named(runs: Path) -> None:
         done = invoke("collection", "status", "tiny")
         assert done.exit_code == 1
         assert "0123456789abcdef.json: is no solution and no proof" in " ".join(done.output.split())
+    path.unlink()
+    # an error that is no number is none
+    finder = json.dumps({"by": "me", "error": np.nan, "date": "2026-01-02"})
+    np.savez(path.with_suffix(".npz"), origin=finder, r=np.zeros(3))
+    done = invoke("collection", "status", "tiny")
+    assert done.exit_code == 1
+    assert "its error is nan" in " ".join(done.output.split())
 
 
 def test_a_better_solution_is_verified_and_taken(runs: Path, tmp_path: Path) -> None:

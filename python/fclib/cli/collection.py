@@ -526,8 +526,10 @@ def status(
             out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
         return
     families: dict[str, Counter[str]] = {}
-    limits = {row.id.split("/")[1]: row.limit for row in rows if row.limit is not None}
+    limits: dict[str, set[float]] = {}
     for row in rows:
+        if row.limit is not None:
+            limits.setdefault(row.id.split("/")[1], set()).add(row.limit)
         families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
     families["all"] = sum(families.values(), Counter())
     columns = [*CLASSES, *(["not run"] if families["all"]["not run"] else [])]
@@ -536,7 +538,7 @@ def status(
             [
                 {
                     "family": family,
-                    "CPU a run [s]": limits.get(family),
+                    "CPU a run [s]": " or ".join(f"{t:g}" for t in sorted(limits.get(family, ()))),
                     **{column: counts[column] for column in columns},
                 }
                 for family, counts in families.items()

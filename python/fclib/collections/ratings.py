@@ -38,7 +38,7 @@ import numpy as np
 
 from fclib import _core, _digest, _stored, scenes
 from fclib._verdicts import UNSUITABLE, is_solved, rating
-from fclib.collections import catalog, published, set_index, trajectory
+from fclib.collections import catalog, published, references, set_index, trajectory
 
 TOLERANCE: Final = 1e-8
 DIGITS: Final = 16  # digits of a digest that name a solution
@@ -195,6 +195,8 @@ def _run_of(path: Path) -> Run:
         with np.load(path) as arrays:
             finder = json.loads(str(arrays["origin"]))
         error, date = float(finder["error"]), finder["date"]
+        if not np.isfinite(error):
+            raise ValueError(f"its error is {error}")
         return Run(path.stem, finder["by"], "", None, TAKEN, error, None, date)
     except (KeyError, TypeError, ValueError) as wrong:
         raise RatingError(f"{path}: is no solution and no proof: {wrong}") from None
@@ -376,7 +378,9 @@ def accept_solution(path: Path, by: str, name: str | None = None) -> tuple[str, 
             f"{name}: the error of this solution is {error:.3g}, and {best:.3g} is known"
             + (f" by {row.best.solver}" if row.best is not None else "")
         )
-    store_solution(own, row.digest, solution, {"by": by, "error": error, "date": today()})
+    store_solution(
+        own, row.digest, solution, {"by": by, "error": error, "date": references.today()}
+    )
     return name, error, best
 
 
@@ -406,7 +410,10 @@ def accept_proof(path: Path, by: str, name: str | None = None) -> str:
         raise RatingError(
             f"{path}: proves it up to reactions of {proof.bound:.1e}, and exact proofs are taken"
         )
-    text = json.dumps(proof.record(own) | {"by": by, "date": today()}, sort_keys=True) + "\n"
+    text = (
+        json.dumps(proof.record(own) | {"by": by, "date": references.today()}, sort_keys=True)
+        + "\n"
+    )
     target = solution_path(row.digest).with_suffix(".json")
     target.parent.mkdir(parents=True, exist_ok=True)
     catalog.replace_file(target, lambda beside: beside.write_text(text, encoding="utf-8"))
@@ -422,11 +429,6 @@ def _open_one(name: str) -> RatedProblem:
         words = f"is {row.rating}" if row.rating else "was not run"
         raise RatingError(f"{name}: {words}, and solutions are taken of open problems")
     return row
-
-
-def today() -> str:
-    """The day, as ISO 8601."""
-    return datetime.now(timezone.utc).date().isoformat()
 
 
 def store_solution(

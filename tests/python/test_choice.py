@@ -286,6 +286,32 @@ def test_what_standard_leaves_and_half_solve_is_run_for_longer_and_hard() -> Non
     assert not set(left[1:]) & set(again.of("hard"))
 
 
+def test_further_ones_of_a_hard_family_are_measured_and_are_no_part_of_standard() -> None:
+    rows = [candidate(f"{family}/{family}/{k:04d}") for family in "ab" for k in range(40)]
+    first = [k for k, words in enumerate(select.not_measured(rows)) if not words]
+    hard = [k for k in first if rows[k]["scene"] == "a"][:2]  # a quarter of those measured
+    for k in first:
+        ran(rows[k], 2 if k in hard else 5)
+    measured = [k for k, words in enumerate(select.not_measured(rows, RULE)) if not words]
+    assert set(first) < set(measured)
+    assert Counter(rows[k]["scene"] for k in measured) == {
+        "a": select.MEASURED + select.FURTHER,
+        "b": select.MEASURED,
+    }
+    before = select.choose(rows, RULE)
+    further = sorted(set(measured) - set(first))
+    assert all(before.why[k] == "not run with a limit of 10 s" for k in further)
+    for k, solved in zip(further, (0, 0, 1, 4, 5, 8, 8, 8), strict=True):
+        ran(rows[k], solved)
+    assert select.for_longer(rows, RULE) == further[:3]  # those that few solve
+    for k, solved in zip(further, (0, 1, 2, 4), strict=False):
+        ran(rows[k], solved, limit=60.0)
+    after = select.choose(rows, RULE)
+    assert after.of("standard") == before.of("standard") != []
+    assert [after.set[k] for k in further] == ["open", "hard", "hard", "hard", "", "", "", ""]
+    assert after.why[further[-1]] == "for hard and open alone: 8 of 8 solvers in 10 s"
+
+
 def test_the_hardest_come_first_and_six_of_a_family() -> None:
     rows = [ran(ran(candidate(f"a/A/{k:04d}"), 0), 1, 60.0, cost=1.0 + k) for k in range(8)]
     rows += [ran(ran(candidate("b/B/0000"), 0), 2, 60.0), ran(candidate("c/C/0000"), 5)]

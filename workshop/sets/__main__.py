@@ -59,7 +59,7 @@ def find_candidates(
     try:
         with many_bars() as bars:
             rows, failed = difficulty.describe(folder, own, bars)
-        count = difficulty.write_problems(folder, rows)
+        count = difficulty.write_problems(folder, difficulty.measured(folder), select.Rule())
     except difficulty.FAULTS as error:
         fail(str(error))
     words = f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}"
@@ -86,7 +86,8 @@ def measure(
 ) -> None:
     """Measure what solvers do on the candidates: campaigns difficulty and difficulty-long.
 
-    It goes on after a kill.
+    Further candidates of families that have hard ones are written, and measured too. It goes on
+    after a kill.
     """
     rule = select.Rule()
     files = len(list((folder / "problems").glob("*/*.hdf5")))
@@ -99,6 +100,10 @@ def measure(
         return
     try:
         difficulty.run(folder, select.SHORT, jobs)
+        count = difficulty.write_problems(folder, difficulty.measured(folder), rule)
+        if count > files:
+            out.print(difficulty.needed(folder, select.SHORT, count), highlight=False)
+            difficulty.run(folder, select.SHORT, jobs)
         # first the difficult ones: `standard` follows from them, and `hard` from what it leaves
         for _ in range(2):
             count = difficulty.link_difficult(folder, rule)

@@ -119,11 +119,11 @@ def write_costs(path: Path, costs: Mapping[str, float]) -> None:
     path.write_text("family,CPU [s]\n" + "".join(lines), encoding="utf-8")
 
 
-def write_problems(folder: Path, rows: Sequence[select.Row]) -> int:
+def write_problems(folder: Path, rows: Sequence[select.Row], rule: select.Rule) -> int:
     """Write a file for each candidate that is measured; remove others. Return their number."""
     wanted = {
         path_of(folder, row): row
-        for row, words in zip(rows, select.not_measured(rows), strict=True)
+        for row, words in zip(rows, select.not_measured(rows, rule), strict=True)
         if not words
     }
     for path in (folder / "problems").glob("*/*.hdf5"):

@@ -8,7 +8,8 @@ without the problems and without a run, and equal tables give equal choices.
 1. A candidate is left out if it has the same data as an earlier one, if it is nearly the same in
    the space of features (`features.NEAR`), if it is trivial (r = 0 is a solution, or `nsgs` takes
    at most SWEEPS sweeps), or if it is too large. Of what stays, MEASURED of a family are measured:
-   those that are farthest apart.
+   those that are farthest apart. If many of these may be hard, FURTHER ones are measured; they are
+   for `hard` and `open` alone.
 2. `standard`: the candidates that stay are clustered. An integer program takes problems of as many
    clusters as it can, within the bounds of `Rule`. If a lower bound cannot be met together with the
    others, as little as possible is lacking, and it is told. Among equal choices it takes problems
@@ -50,6 +51,7 @@ SWEEPS: Final = 20  # a problem that nsgs solves with no more sweeps is trivial
 # Largest number of problems of a family that are measured. Sets take at most six. Each costs up to
 # 160 s: a run of 10 s by eight solvers, and one of its copy by those that solve it.
 MEASURED: Final = 8
+FURTHER: Final = 8  # and so many more of a family that has hard ones
 SHORT, LONG = 10.0, 60.0  # [s] of CPU a run, the two limits
 TEXTS: Final = (
     *("problem", "label", "scene", "digest", "law", "left_out", "best_by", "proof", "set", "why"),
@@ -87,6 +89,7 @@ class Rule:
     difficult: int = 30  # least number of such problems in standard
     difficult_share: float = 0.25  # and their largest share: the others are for `hard`
     hard_share: float = 0.5  # a problem is hard if at most this share of the solvers solves it
+    further_share: float = 0.25  # least share of a family's measured ones that may be hard
     quick: float = 0.01  # [s] a problem is quick if all solvers solve it within this time
     quick_share: float = 0.1  # largest share of them
     balance: float = 0.1  # each solver but the best and the worst solves and fails so many
@@ -180,19 +183,45 @@ def describes(rows: Sequence[Row], found: Candidates) -> bool:
     )
 
 
-def not_measured(rows: Sequence[Row]) -> list[str]:
-    """Why each candidate is not measured; empty for those that are."""
-    found = left_out(rows)
+def not_measured(rows: Sequence[Row], rule: Rule | None = None) -> list[str]:
+    """Why each candidate is not measured; empty for those that are.
+
+    With a rule, further ones are measured of the families that have hard ones.
+    """
+    data = left_out(rows)
+    found = farthest_of(rows, data, {})
+    if rule is None:
+        return found
+    tried: Counter[str] = Counter()
+    hard: Counter[str] = Counter()
+    for row, words in zip(rows, found, strict=True):
+        if not words and share_solved(row, SHORT) is not None:
+            tried[row["scene"]] += 1
+            hard[row["scene"]] += may_be_hard(row, rule)
+    many = [scene for scene in tried if hard[scene] >= max(1, rule.further_share * tried[scene])]
+    return farthest_of(rows, data, dict.fromkeys(many, MEASURED + FURTHER))
+
+
+def farthest_of(rows: Sequence[Row], data: Sequence[str], most: Mapping[str, int]) -> list[str]:
+    """Why each candidate is left out, if of each family those farthest apart are taken.
+
+    Args:
+        rows: the candidates.
+        data: why each is left out by its data.
+        most: how many of a family are taken, if not MEASURED.
+    """
+    found = list(data)
     own: dict[str, list[int]] = defaultdict(list)
     for k, words in enumerate(found):
         if not words:
             own[rows[k]["scene"]].append(k)
     place = features.points(rows)
     for scene, places in own.items():
-        inside = {places[k] for k in features.farthest(place[places], MEASURED)}
+        count = most.get(scene, MEASURED)
+        inside = {places[k] for k in features.farthest(place[places], count)}
         for k in places:
             if k not in inside:
-                found[k] = f"not measured: of {scene}, {MEASURED} others are farther apart"
+                found[k] = f"not measured: of {scene}, {count} others are farther apart"
     return found
 
 
@@ -326,7 +355,8 @@ class Chosen:
 
 def choose(rows: Sequence[Row], rule: Rule) -> Chosen:
     """The sets `standard`, `hard` and `open` from a table of measured candidates."""
-    why = not_measured(rows)
+    first = not_measured(rows)
+    why = not_measured(rows, rule)
     chosen = Chosen([""] * len(rows), why)
     for k, row in enumerate(rows):
         if why[k]:
@@ -338,7 +368,11 @@ def choose(rows: Sequence[Row], rule: Rule) -> Chosen:
     stay = [k for k, words in enumerate(why) if not words]
     closed = [k for k in stay if not is_open(rows[k])]
     # what only a proof solves tells no solver from another
-    for k in standard(rows, [k for k in closed if not rows[k].get("proof")], rule, chosen):
+    told = [k for k in closed if not first[k] and not rows[k].get("proof")]
+    for k in stay:
+        if first[k]:
+            why[k] = f"for hard and open alone: {words_of(rows[k])}"
+    for k in standard(rows, told, rule, chosen):
         chosen.set[k] = "standard"
     left = [k for k in closed if not chosen.set[k] and may_be_hard(rows[k], rule)]
     for k in left:

@@ -170,7 +170,7 @@ def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -
 
 def prose(words: str) -> list[str]:
     """A paragraph of the page."""
-    return [*textwrap.wrap(words, 118), ""]
+    return [*textwrap.wrap(words, 118, break_on_hyphens=False), ""]
 
 
 HEAD: Final = [

@@ -84,11 +84,14 @@ def distance(problem: Any, known: Numbers) -> dict[str, float]:
     """The distance of a problem from that of a sketch: ||A - A'|| / ||A||, if it is not 0.
 
     It is estimated from two sums with signs. If many entries differ, one in 64 estimates is more
-    than eight times too small; if few differ, they may cancel. The sizes must be equal.
+    than eight times too small; if few differ, they may cancel. The sizes must be equal. Sketches
+    have no coefficients of spin friction.
     """
     own = sketch(problem)
     found = {}
     for name, part in parts(problem).items():
+        if name in SPIN:
+            continue
         numbers = part if isinstance(part, np.ndarray) else part.data
         row = FIELDS.index(name)
         apart = float(np.sqrt(np.mean((own[row] - known[row]) ** 2)))

@@ -13,6 +13,7 @@ from fclib.collections import published
 pytest.importorskip("mujoco")
 
 from fclib.simulate import MujocoModel, Step, simulate
+from helpers_simulate import force_on, mujoco_of
 
 DEEPEST = 0.02  # penetration, of the smallest body's diameter
 
@@ -21,24 +22,6 @@ def depth(step: Step) -> float:
     """The largest penetration, of the diameter of the smallest body."""
     size: Any = step.model.smallest_size
     return float(np.max(-step.contacts.gap, initial=0.0) / (2 * size))
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def force_on(step: Step, body: str) -> Any:
-    """(3) what the contacts press a body with [N]."""
-    model = mujoco_of(step)
-    bodies = model.geom_bodyid[step.contacts.pair]
-    own = bodies == model.body(body).id
-    sign = own[:, 1].astype(float) - own[:, 0]
-    d = step.problem.spacedim
-    impulses = np.reshape(step.result.solution.r, (-1, d))
-    turned = np.einsum("ci,cij->cj", impulses, step.contacts.frame[:, :d])
-    return sign @ turned / model.opt.timestep
 
 
 # ---- all of them

@@ -16,18 +16,8 @@ from fclib.scenes.shared import masonry
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 
-from fclib.simulate import MujocoModel, Step, simulate
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def last_of(scene: scenes.Scene, steps: int, **settings: Any) -> Step:
-    *_, last = simulate(scene, steps, **settings)
-    return last
+from fclib.simulate import Step, simulate
+from helpers_simulate import last_of, mujoco_of
 
 
 def places(step: Step) -> npt.NDArray[np.float64]:

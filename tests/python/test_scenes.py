@@ -14,6 +14,7 @@ from fclib.scenes.shared import mjcf
 pytest.importorskip("mujoco")
 
 from fclib.simulate import MujocoModel, Step, problem_at, scheme_of, simulate
+from helpers_simulate import last_of
 
 FAMILIES = scenes.families()
 
@@ -135,11 +136,6 @@ def test_boxes_stack_refuses_nonsense(name: str, value: float) -> None:
 
 
 # ---- the scenes stand; energy never grows without cause
-
-
-def last_of(scene: scenes.Scene, steps: int) -> Step:
-    *_, last = simulate(scene, steps)
-    return last
 
 
 def places(step: Step) -> Any:

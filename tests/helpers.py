@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -421,6 +424,18 @@ def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fcli
     q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)
     d = q.size // mu.size if mu.size else 3
     return fclib.LocalProblem(spacedim=d, W=sp.csr_array(np.asarray(W, float)), q=q, mu=mu)
+
+
+def script(path: str) -> ModuleType:
+    """A script of this repository, as a module."""
+    place = Path(__file__).parents[1] / path
+    spec = importlib.util.spec_from_file_location(place.stem, place)
+    assert spec is not None
+    assert spec.loader is not None
+    found = importlib.util.module_from_spec(spec)
+    sys.modules[place.stem] = found  # dataclasses look for it there
+    spec.loader.exec_module(found)
+    return found
 
 
 def git(*words: str) -> str:

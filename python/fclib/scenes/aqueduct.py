@@ -133,19 +133,13 @@ class Aqueduct:
                 1.1 * back,
                 speed=self.settlement if sinks else 0.0,
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Aqueduct",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.radius,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=self.radius,
+            rest=[*built.rest, *built.keyframe()],
             focus=(0.0, 0.0, 0.5 * bottom, 0.45 * bottom),
         )
 

@@ -92,17 +92,11 @@ class Arch:
         built.support(
             "right", [right], front - more, back + more, axis=(1, 0, 0), speed=self.spread
         )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Arch",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.radius,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=0.5 * self.radius,
+            rest=[*built.rest, *built.keyframe()],
         )

@@ -64,15 +64,4 @@ class BouncingPile:
             place[2] += self.radius + self.height
             place += self.radius * draw
             bodies.append(mjcf.sphere(i, self.spheres, place, self.radius, self.density, friction))
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "BouncingPile",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius)

@@ -72,16 +72,10 @@ class BoxesStack:
                 f'<geom type="mesh" mesh="box" mass="{self.mass!r}" friction="{self.mu!r}"'
                 f' condim="3" material="solid" rgba="{mjcf.shade(i, self.boxes)}"/></body>'
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "BoxesStack",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("box", self.size, self.size, self.size)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.size,
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("box", self.size, self.size, self.size)],
+            tile=self.size,
         )

@@ -113,19 +113,13 @@ class Bridge:
         built.support("right", right, front, back, axis=(1, 0, 0), speed=self.spread)
         velocity += [0.0] * len(built.speeds)
         reach = arcade.end + 0.5 * approach
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Bridge",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.radius,
-                rest=[*built.rest, *built.keyframe(velocity)],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=0.5 * self.radius,
+            rest=[*built.rest, *built.keyframe(velocity)],
             focus=(0.0, 0.0, 0.5 * arcade.top, 0.5 * reach),
         )
 

@@ -97,18 +97,12 @@ class Capsules:
                 f' rgba="{mjcf.shade(i, self.capsules)}"/></body>'
             )
         bodies += mjcf.walls(0.5 * self.width, self.width, self.mu)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Capsules",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-                velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            tile=0.25 * self.width,
+            velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
+            rest=mjcf.margins(self.margin),
             law="gap" if self.gaps else "velocity",
         )

@@ -118,19 +118,13 @@ class Chain:
                 z += self._height(pitch, along, across)
                 if i >= self.links - 1 - self.loose:
                     z += gaps[i]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Chain",
-                bodies=links,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-self.length,
-                tile=0.1 * self.length,
-                velocity=velocities,
-            ),
+            bodies=links,
+            floor_z=-self.length,
+            tile=0.1 * self.length,
+            velocity=velocities,
             # a link in the middle with its two joints: the whole chain would be a hair
             focus=(0.0, 0.0, -(self.links // 2) * pitch, 0.3 * pitch),
             view=(125.0, -60.0),

@@ -96,18 +96,12 @@ class ChainMail:
                 mjcf.grain("ball", (*shift, high), shape, mjcf.surface(self.mu), "0.62 0.3 0.2 1")
             )
         low = -self.spacing * self.across
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ChainMail",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=low,
-                tile=self.spacing,
-            ),
+            bodies=bodies,
+            floor_z=low,
+            tile=self.spacing,
             law="gap",
             focus=(0.0, 0.0, 0.0, 0.65 * self.spacing * self.across),
         )

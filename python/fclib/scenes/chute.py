@@ -126,19 +126,13 @@ class Chute:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                assets=[mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * pitch,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            assets=[mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
+            tile=2 * pitch,
+            rest=mjcf.margins(self.margin),
             law="gap" if self.gaps else "velocity",
         )
 

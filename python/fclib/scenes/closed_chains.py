@@ -93,18 +93,12 @@ class ClosedChains:
                 f' anchor="{mjcf.numbers(self.length, 0, 0)}"/></equality>',
                 f'<contact><exclude body1="link{i}.{last}" body2="link{i}.0"/></contact>',
             ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ClosedChains",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                rest=rest,
-            ),
+            bodies=bodies,
+            tile=self.length,
+            rest=rest,
             # ends of rods are fast: nothing is to be passed through
             law="velocity" if self.restitution else "gap",
         )

@@ -80,16 +80,10 @@ class DiscFlow:
             )
         end = 0.5 * width
         walls = [((-1.2 * width, 1.2 * rise * width), (0.0, 0.0)), ((end, 0.0), (end, 1.5 * end))]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "DiscFlow",
-                bodies=[*bodies, *mjcf.lines(walls, f'friction="{self.mu!r}"')],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
+            bodies=[*bodies, *mjcf.lines(walls, f'friction="{self.mu!r}"')],
+            tile=4 * self.radius,
             planar=True,
         )

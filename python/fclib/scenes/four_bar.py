@@ -94,27 +94,21 @@ class FourBar:
             )
             motors.append(f'<velocity joint="crank{i}" kv="{self.gain!r}"/>')
         controls = mjcf.numbers(*[self.speed] * self.linkages)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "FourBar",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.block,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    "<actuator>",
-                    *motors,
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
+            tile=4 * self.block,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                "<actuator>",
+                *motors,
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

@@ -99,19 +99,13 @@ class GearTrain:
             ),
             "</keyframe>",
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "GearTrain",
-                bodies=bodies,
-                assets=[self._tooth(f"tooth{count}", count) for count in dict.fromkeys(counts)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=10 * self.module,
-                rest=drive,
-            ),
+            bodies=bodies,
+            assets=[self._tooth(f"tooth{count}", count) for count in dict.fromkeys(counts)],
+            tile=10 * self.module,
+            rest=drive,
             planar=True,
         )
 

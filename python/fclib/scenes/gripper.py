@@ -103,27 +103,21 @@ class Gripper:
             f' ctrl="{mjcf.numbers(*squeeze, up * self.lift)}"/>'
             for i, (share, up) in enumerate(heights)
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Gripper",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.height,
-                rest=[
-                    "<actuator>",
-                    '<motor joint="left"/>',
-                    '<motor joint="right"/>',
-                    f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-            ),
+            bodies=bodies,
+            tile=2 * self.height,
+            rest=[
+                "<actuator>",
+                '<motor joint="left"/>',
+                '<motor joint="right"/>',
+                f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
         )
 
     def _hand(self, reach: float) -> str:

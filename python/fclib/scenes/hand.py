@@ -119,29 +119,23 @@ class Hand:
             for k in range(self.fingers)
             for name in ("upper", "lower")
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Hand",
-                bodies=[thing, self._hand()],
-                assets=[mjcf.polyhedron_mesh("object", corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.size,
-                rest=[
-                    "<actuator>",
-                    *motors,
-                    f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-                # a capsule and a mesh touch in one point then
-                multiccd=False,
-            ),
+            bodies=[thing, self._hand()],
+            assets=[mjcf.polyhedron_mesh("object", corners)],
+            tile=2 * self.size,
+            rest=[
+                "<actuator>",
+                *motors,
+                f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
+            # a capsule and a mesh touch in one point then
+            multiccd=False,
         )
 
     def _hand(self) -> str:

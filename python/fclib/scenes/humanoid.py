@@ -184,19 +184,7 @@ class Humanoid:
                     f"<contact><exclude {pair}/></contact>",
                 ]
         rest += self._drive(hips, places)
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.height,
-                rest=rest,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=0.25 * self.height, rest=rest)
 
     @property
     def _limbs_held(self) -> list[Limb]:

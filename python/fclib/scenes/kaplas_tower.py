@@ -83,16 +83,10 @@ class KaplasTower:
                     f' condim="3" material="solid"'
                     f' rgba="{mjcf.shade(2 * level + i % 2, 2 * self.levels)}"/></body>'
                 )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "KaplasTower",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
+            tile=self.length,
         )

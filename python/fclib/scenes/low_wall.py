@@ -83,19 +83,13 @@ class LowWall:
                 axis=(0, 1, 0),
                 speed=self.push,
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "LowWall",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=self.length,
+            rest=[*built.rest, *built.keyframe()],
             # from behind: the ram would hide the wall
             view=(-55.0, -14.0),
         )

@@ -69,16 +69,4 @@ class NewtonsCradle:
             )
         # forwards is about -y
         swing = [-self.speed / self.length * (i < self.struck) for i in range(self.balls)]
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "NewtonsCradle",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                velocity=swing,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius, velocity=swing)

@@ -103,19 +103,13 @@ class PeriodicBox:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "PeriodicBox",
-                bodies=bodies,
-                assets=[mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.125 * self.period,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            assets=[mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
+            tile=0.125 * self.period,
+            rest=mjcf.margins(self.margin),
             law="gap",
             period=(self.period, self.period),
             focus=(0.0, 0.0, 0.5 * self.period, 0.55 * self.period),

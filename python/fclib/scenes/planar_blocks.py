@@ -94,21 +94,15 @@ class PlanarBlocks:
             # thrown so high that it comes down at the place of its start
             up = 0.5 * self.gravity * self.delay
             velocity = np.vstack((velocity, [self.disc_speed, up, 0.0]))
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "PlanarBlocks",
-                bodies=bodies,
-                assets=[
-                    mjcf.block_mesh("block", self.length, self.height, self.height),
-                    mjcf.block_mesh("half", half, self.height, self.height),
-                ],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                velocity=velocity.ravel(),
-            ),
+            bodies=bodies,
+            assets=[
+                mjcf.block_mesh("block", self.length, self.height, self.height),
+                mjcf.block_mesh("half", half, self.height, self.height),
+            ],
+            tile=self.length,
+            velocity=velocity.ravel(),
             planar=True,
         )

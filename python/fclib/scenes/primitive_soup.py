@@ -90,19 +90,8 @@ class PrimitiveSoup:
                     turned[i],
                 )
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-                multiccd=False,
-            ),
-            law="gap",
+        return Scene.of_bodies(
+            self, seed, bodies=bodies, tile=0.25 * self.width, multiccd=False, law="gap"
         )
 
     def _surface(self) -> str:

@@ -93,28 +93,22 @@ class Pusher:
             keys.append(
                 f'<key name="gait{len(keys)}" time="{time!r}" ctrl="{mjcf.numbers(*angles)}"/>'
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Pusher",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.arm,
-                rest=[
-                    "<actuator>",
-                    *(
-                        f'<position joint="{name}" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>'
-                        for name in ("shoulder", "elbow", "wrist")
-                    ),
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-            ),
+            bodies=bodies,
+            tile=0.5 * self.arm,
+            rest=[
+                "<actuator>",
+                *(
+                    f'<position joint="{name}" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>'
+                    for name in ("shoulder", "elbow", "wrist")
+                ),
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
         )
 
     @property

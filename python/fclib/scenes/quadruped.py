@@ -101,31 +101,25 @@ class Quadruped:
         )
         # backwards: the foot that stands goes to the rear
         controls = mjcf.numbers(*[-self.speed] * 4)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Quadruped",
-                bodies=[
-                    *mjcf.uneven_ground(
-                        random, self.roughness, self.block, (-10 * a, 40 * a), 7 * a, self.mu
-                    ),
-                    trunk,
-                ],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.block,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    "<actuator>",
-                    *motors,
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=[
+                *mjcf.uneven_ground(
+                    random, self.roughness, self.block, (-10 * a, 40 * a), 7 * a, self.mu
+                ),
+                trunk,
+            ],
+            tile=self.block,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                "<actuator>",
+                *motors,
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

@@ -60,24 +60,16 @@ class RockingBlock:
         # on the right edge, at the origin; just closed
         x = -half * math.sin(self.slenderness - angle)
         z = half * math.cos(self.slenderness - angle) - 1e-9
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "RockingBlock",
-                bodies=[
-                    mjcf.block(
-                        "block", (0.0, 0.0), "block", self.mass, mjcf.surface(self.mu)
-                    ).replace('material="solid"', 'material="solid" rgba="0.45 0.5 0.6 1"')
-                ],
-                assets=[mjcf.block_mesh("block", self.width, self.width, self.height)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.width,
-                rest=[
-                    f'<keyframe><key name="start" qpos="{mjcf.numbers(x, z, angle)}"/></keyframe>'
-                ],
-            ),
+            bodies=[
+                mjcf.block("block", (0.0, 0.0), "block", self.mass, mjcf.surface(self.mu)).replace(
+                    'material="solid"', 'material="solid" rgba="0.45 0.5 0.6 1"'
+                )
+            ],
+            assets=[mjcf.block_mesh("block", self.width, self.width, self.height)],
+            tile=self.width,
+            rest=[f'<keyframe><key name="start" qpos="{mjcf.numbers(x, z, angle)}"/></keyframe>'],
             planar=True,
         )

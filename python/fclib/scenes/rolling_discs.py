@@ -77,18 +77,12 @@ class RollingDiscs:
                     f' rgba="{mjcf.shade(i, self.discs)}"',
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "RollingDiscs",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                condim=6,
-                floor_mu_r=self.mu_r,
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            condim=6,
+            floor_mu_r=self.mu_r,
             planar=True,
         )

@@ -80,17 +80,6 @@ class RollingSpheres:
                 f' friction="{mu!r} 0 {mu_r!r}" condim="6" material="solid"'
                 f' rgba="{mjcf.shade(i, self.spheres)}"/></body>'
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "RollingSpheres",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                condim=6,
-                floor_mu_r=self.mu_r,
-            ),
+        return Scene.of_bodies(
+            self, seed, bodies=bodies, tile=4 * self.radius, condim=6, floor_mu_r=self.mu_r
         )

@@ -90,17 +90,6 @@ class Rope:
             f' pos="{mjcf.numbers(0, 0, height)}" {mjcf.surface(self.mu)}'
             ' material="solid" rgba="0.5 0.5 0.5 1"/>'
         )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "Rope",
-                bodies=[drum, text],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-height,
-                tile=self.drum,
-            ),
-            planar=True,
+        return Scene.of_bodies(
+            self, seed, bodies=[drum, text], floor_z=-height, tile=self.drum, planar=True
         )

@@ -113,26 +113,20 @@ class Rover:
         names = [f"{side}{k}" for side in ("left", "right") for k in range(3)]
         kv = self.torque / self.speed
         speeds = mjcf.numbers(*[self.speed] * len(names))
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Rover",
-                bodies=bodies,
-                assets=assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.base,
-                rest=[
-                    '<equality><joint joint1="leftrocker" joint2="rightrocker"'
-                    ' polycoef="0 -1 0 0 0"/></equality>',
-                    "<actuator>",
-                    *(f'<velocity joint="{name}" kv="{kv!r}"/>' for name in names),
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{speeds}"/></keyframe>',
-                ],
-            ),
+            bodies=bodies,
+            assets=assets,
+            tile=self.base,
+            rest=[
+                '<equality><joint joint1="leftrocker" joint2="rightrocker"'
+                ' polycoef="0 -1 0 0 0"/></equality>',
+                "<actuator>",
+                *(f'<velocity joint="{name}" kv="{kv!r}"/>' for name in names),
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{speeds}"/></keyframe>',
+            ],
             law="gap",
         )
 

@@ -146,19 +146,13 @@ class ShearBox:
             ),
             "</keyframe>",
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ShearBox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-20 * self.radius,
-                tile=4 * self.radius,
-                rest=drive,
-            ),
+            bodies=bodies,
+            floor_z=-20 * self.radius,
+            tile=4 * self.radius,
+            rest=drive,
             law="gap",
             planar=True,
             focus=(0.0, 0.0, 0.5 * top, 1.2 * half),

@@ -105,18 +105,12 @@ class Silo:
             f'<actuator><velocity joint="floor" kv="{weight / 1e-3!r}"/></actuator>',
             f'<keyframe><key name="start" ctrl="{self.sink!r}"/></keyframe>',
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Silo",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-10 * self.radius,
-                tile=4 * self.radius,
-                rest=drive,
-            ),
+            bodies=bodies,
+            floor_z=-10 * self.radius,
+            tile=4 * self.radius,
+            rest=drive,
             planar=True,
         )

@@ -98,24 +98,18 @@ class SliderCrank:
             for z in (self._height - 3.4 * self.pin, self._height + 3.4 * self.pin)
         ]
         controls = mjcf.numbers(self.speed)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SliderCrank",
-                bodies=[shaft, *bodies, *rails],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.crank,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    f'<actuator><velocity joint="shaft" kv="{self.gain!r}"/></actuator>',
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=[shaft, *bodies, *rails],
+            tile=2 * self.crank,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                f'<actuator><velocity joint="shaft" kv="{self.gain!r}"/></actuator>',
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

@@ -85,15 +85,4 @@ class Spheres:
                     mjcf.shade(i, self.spheres),
                 )
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "Spheres",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius)

@@ -86,17 +86,11 @@ class SpheresBox:
             ' material="solid" rgba="0.45 0.47 0.5 1"/></body>'
         )
         bodies += mjcf.walls((x, y), height, self.mu)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SpheresBox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            rest=mjcf.margins(self.margin),
             law="gap",
         )

@@ -89,15 +89,4 @@ class SpheresInABox:
             z = self.lift + pitch * (layer + 0.5)
             place = np.array([x, y, z]) + room * (2 * draws[i, 1:] - 1)
             bodies.append(mjcf.sphere(i, self.spheres, place, radius, self.density, friction))
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "SpheresInABox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=0.25 * self.width)

@@ -74,16 +74,10 @@ class SpinningBodies:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SpinningBodies",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                velocity=np.column_stack((np.zeros_like(axes), axes)).ravel(),
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            velocity=np.column_stack((np.zeros_like(axes), axes)).ravel(),
         )

@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Aqueduct:
+class Aqueduct(Published):
     """Tiers of semicircular arcades upon each other, between two walls of rock.
 
     Rings, backing, spandrels, piers and decks are rigid stones; every joint has four contacts, so
@@ -32,10 +32,8 @@ class Aqueduct:
     )
     application: ClassVar[str] = "masonry"
     authors: ClassVar[str] = "V. Acary, M. Bremond, O. Huber; LMGC90 development team"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 60
-    allowance: ClassVar[bool] = False  # its published states have none
     # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"spans": 2, "tiers": 1}
 

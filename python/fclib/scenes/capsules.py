@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Capsules:
+class Capsules(Published):
     """Equal capsules, layer above layer, that fall into an open box.
 
     They start on a grid wide enough that they do not touch, in random directions near the
@@ -30,10 +30,8 @@ class Capsules:
     description: ClassVar[str] = "Equal capsules dropped into an open box, under gravity."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1705
-    allowance: ClassVar[bool] = False  # its published states have none
 
     capsules: int = parameter(100, "1", "number of capsules, at least 1")
     length: float = parameter(5.0, "m", "length of a capsule, caps included")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
@@ -18,7 +18,7 @@ OVERLAP: Final = 1e-6  # [m], at the start: the law on velocities keeps such joi
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain:
+class Chain(Published):
     """Links that hang one in another, the first one held, the lower end set in motion.
 
     A link is a loop of straight rods, all links alike: two sides, and two ends that follow a half
@@ -40,10 +40,8 @@ class Chain:
     )
     application: ClassVar[str] = "multibody systems"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1514
-    allowance: ClassVar[bool] = False  # its published states have none
 
     links: int = parameter(11, "1", "number of links, the held one among them, at least 2")
     length: float = parameter(13.7, "m", "length of the chain")

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Pair = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FourBar:
+class FourBar(Published):
     """Four-bar linkages in a row, driven by their cranks, each before a stack of blocks.
 
     Crank and rocker turn on a frame; the coupler hangs on the crank, and a bilateral constraint
@@ -29,11 +29,8 @@ class FourBar:
         "Driven four-bar linkages, closed loops, whose legs kick stacks of blocks over a floor."
     )
     application: ClassVar[str] = "mechanisms, robotics"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     linkages: int = parameter(3, "1", "number of linkages, at least 1")
     blocks: int = parameter(3, "1", "blocks of the stack before a linkage, at least 1")

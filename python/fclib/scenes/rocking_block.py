@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class RockingBlock:
+class RockingBlock(Published):
     """A block that is tilted and let go; each time it comes down it strikes with its other edge.
 
     A slender block turns about an edge for (1/p) acosh(1 / (1 - theta / alpha)) until it comes
@@ -25,10 +25,8 @@ class RockingBlock:
     description: ClassVar[str] = "A slender block in the plane that rocks from edge to edge."
     application: ClassVar[str] = "impacts"
     authors: ClassVar[str] = "the authors of FCLIB, after G. W. Housner"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 300
-    allowance: ClassVar[bool] = False  # its published states have none
 
     width: float = parameter(0.2, "m", "of the block")
     height: float = parameter(2.0, "m", "of the block")

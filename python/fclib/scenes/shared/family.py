@@ -457,7 +457,7 @@ class Family(Described, Protocol):
 
     If it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
-    A published family sets `allowance` to False, since its states were simulated without.
+    A family whose published states were simulated without sets `allowance` to False.
 
     If the default scene takes long, `small` holds parameters of a quick one of the kind.
     """
@@ -468,6 +468,14 @@ class Family(Described, Protocol):
     def scene(self, seed: int = 0) -> Scene:
         """The scene of these parameters; the same seed gives the same scene, bit for bit."""
         ...
+
+
+class Published:
+    """What most families have in common whose states are published; one may say otherwise."""
+
+    authors: ClassVar[str] = "the authors of FCLIB"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    allowance: ClassVar[bool] = False  # their published states have none
 
 
 def parameter(default: Any, unit: str, doc: str) -> Any:

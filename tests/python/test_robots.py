@@ -118,17 +118,3 @@ def test_the_blade_lets_no_block_through() -> None:
     inside = np.abs(last[:, 1]) < 0.5 * family.blade - family.edge
     assert inside.any()
     assert (last[inside, 0] > blade).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("Gripper", {"blocks": 0}),
-        ("Gripper", {"mu": 0.0}),
-        ("Pusher", {"across": 0}),
-        ("Pusher", {"edge": -1.0}),
-    ],
-)
-def test_robots_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        scenes.get(name)(**wrong)

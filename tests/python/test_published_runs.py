@@ -284,18 +284,19 @@ def test_what_cannot_be_compared_is_named(tmp_path: Path) -> None:
         assert found.runs > 0
 
 
-def test_the_interval_of_a_ratio_covers_it() -> None:
-    """Noise of 5 % in each solve: the interval has the ratio in 90 to 100 of 100 cases."""
+def test_the_interval_of_a_ratio_covers_that_of_another_solver() -> None:
+    """Noise of 5 % in each solve: the interval has a further one in 90 to 99 of 100 cases."""
     rng = np.random.default_rng(0)
     covered = 0
-    for _ in range(200):
+    for _ in range(400):
         noisy = [
             {name: value * speed * math.exp(rng.normal(0, 0.05)) for name, value in SECONDS.items()}
             for speed in (3.0, 1.0)
         ]
         found = ratio_of(*(replace(CALIBRATED, seconds=own) for own in noisy))
-        covered += found.low <= 3.0 <= found.high
-    assert 180 <= covered <= 200
+        another = 3.0 * math.exp(rng.normal(0, 0.05) - rng.normal(0, 0.05))
+        covered += found.low <= another <= found.high
+    assert 360 <= covered <= 396
     with pytest.raises(ValueError, match="do not compare"):
         ratio_of(CALIBRATED, replace(CALIBRATED, version=0))
 

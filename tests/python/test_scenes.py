@@ -277,6 +277,7 @@ GRAINS: dict[str, tuple[dict[str, Any], int, float]] = {
     "RollingChute": ({"grains": 12, "across": 3, "layers": 2, "shapes": 5}, 130, 0.2),
     "PrimitiveSoup": ({"bodies": 12, "width": 4.3}, 110, 0.08),
     "RollingSoup": ({"bodies": 8, "width": 4.3}, 90, 0.08),
+    "SpinSoup": ({"bodies": 8, "width": 4.3}, 90, 0.08),
     "PeriodicBox": ({"polyhedra": 18, "shapes": 5, "period": 19.0}, 80, 0.04),
 }
 
@@ -299,7 +300,7 @@ def test_grains_land_and_do_not_sink_into_each_other(landed: tuple[str, list[Ste
     assert last.problem.n > 0.6 * len(last.velocity)
     deepest = min(step.contacts.gap.min(initial=0.0) for step in steps)
     assert -GRAINS[name][2] * family.radius < deepest
-    assert last.problem.spacedim == (5 if "Rolling" in name else 3)
+    assert last.problem.spacedim == (5 if "Rolling" in name else 4 if "Spin" in name else 3)
 
 
 def test_grains_stay_inside(landed: tuple[str, list[Step]]) -> None:
@@ -309,7 +310,7 @@ def test_grains_stay_inside(landed: tuple[str, list[Step]]) -> None:
     centres = q[: 7 * (len(q) // 7)].reshape(-1, 7)[:, :3]
     assert centres[:, 2].min() > 0.25 * family.radius
     sides = np.abs(centres[:, :2]).max(axis=0)
-    if name in ("SpheresInABox", "PrimitiveSoup", "RollingSoup"):
+    if name == "SpheresInABox" or "Soup" in name:
         assert sides.max() < 0.5 * family.width - 0.3 * family.radius
     elif name == "SpheresBox":
         # the lid came down on the spheres, and lies on them
@@ -356,6 +357,7 @@ def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
         ("Chute", {"tilt": 1.5, "hexahedra": True}),
         ("RollingChute", {"mu_r": -1.0}),
         ("RollingSoup", {"mu_r": -1.0}),
+        ("SpinSoup", {"mu_s": -1.0}),
         ("PrimitiveSoup", {"bodies": 0}),
         ("PeriodicBox", {"period": 9.0}),
         ("PeriodicBox", {"restitution": 0.5}),

@@ -58,8 +58,9 @@ def find_candidates(
         return
     try:
         with many_bars() as bars:
-            rows, failed = difficulty.describe(folder, own, bars)
-        count = difficulty.write_problems(folder, difficulty.measured(folder), select.Rule())
+            _, failed = difficulty.describe(folder, own, bars)
+        rows = difficulty.measured(folder)
+        count = difficulty.write_problems(folder, rows, select.Rule())
     except difficulty.FAULTS as error:
         fail(str(error))
     words = f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}"

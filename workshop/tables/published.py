@@ -67,12 +67,12 @@ LISTS: Final = {
 }
 # how the problems of a set were taken, if that favours a solver
 TAKEN: Final = {
-    "candidates-long": "`standard`, `hard` and `open` [were chosen]"
-    "(collection.md#a-set-to-benchmark-with) by the runs of `candidates` and of "
-    "`candidates-long`, whose problems at most half of the solvers of `candidates` solve. "
-    "`auto` and the solvers of `matrix` were not among these. So the sets favour them: a problem "
-    "was taken if some of the others fail on it. They show what is left for all, and who solves "
-    "what, more than by how much `auto` is better.",
+    "candidates-long": "The sets `standard`, `hard` and `open` [were chosen]"
+    "(collection.md#a-set-to-benchmark-with) by the runs of `candidates` and `candidates-long`. At "
+    "most half of the solvers of `candidates` solve the problems of `candidates-long`. `auto` and "
+    "the solvers of `matrix` had no part in the choice. A problem was taken if some of the other "
+    "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
+    "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {
@@ -179,9 +179,9 @@ HEAD: Final = [
     "<!-- made by: python -m workshop.tables.published -->",
     "",
     *prose(
-        "This page is made by one command from the [published runs](published-runs.md). Nobody has"
-        " typed a figure of it. [What is measured](measurement.md) says what the words mean: an"
-        " instance, solved, the common set, the shifted mean."
+        "One command makes this page from the [published runs](published-runs.md). No figure on it"
+        " is typed. [What is measured](measurement.md) explains the words: an instance, solved,"
+        " the common set, the shifted mean."
     ),
 ]
 
@@ -192,10 +192,11 @@ def of_sets(
     """The parts of the page on sets."""
     yield from ("## What was run?", "")
     yield from prose(
-        "`planned` are the runs of the whole campaign, as it was last begun. `runs` is less if a "
-        "solver failed, since its copy is then not run, or if the campaign was cut: its order "
-        "makes any part of it balanced over the families. `load` is the load of the machine as "
-        "a run began; above the number of cores, times are longer than on a quiet machine."
+        "`planned` is the number of runs of the whole campaign, as it was last begun. `runs` is "
+        "smaller if solvers failed, because the renumbered copies of such runs are left out. It is "
+        "also smaller if the campaign was cut. The order of a campaign makes each first part of "
+        "it balanced over the families. `load` is the load of the machine when a run began. If it "
+        "is above the number of cores, times are longer than on a quiet machine."
     )
     yield from table("published-parts", [part_row(n, own) for n, own in groups.items()],
                      "Published runs", "")  # fmt: skip
@@ -207,7 +208,7 @@ def of_sets(
         yield from ("## How much is noise?", "")
         yield from prose(
             "Some runs are repeated at other times, on renumbered copies of the problem. The table "
-            "has by how much the slowest of them takes longer than the fastest."
+            "shows by how much the slowest of them takes longer than the fastest."
         )
         yield from table("published-noise", noise, "The spread of repeats", "")
     yield from ("## Who solves how much, and how fast?", "")
@@ -220,9 +221,9 @@ def of_sets(
         yield from pictures(one)
     yield from ("## Who solves what?", "")
     yield from prose(
-        "How many problems of each family a solver solves. Here a problem is solved only if its "
-        "renumbered copy is solved too, as the rule of the sets asks. A dash: the solver takes "
-        "none of them."
+        "The tables count the problems of each family that a solver solves. Here a problem is "
+        "solved only if its renumbered copy is solved too, as the rule of the sets asks. A dash "
+        "says that the solver takes none of them."
     )
     for one in sets:
         for tol in one.tolerances:
@@ -244,10 +245,10 @@ def of_sets(
     if effects:
         yield from ("## What do size, density, rank and conditioning do?", "")
         yield from prose(
-            "The problems of a set are halved at the median of the fact. `shift of the share` "
-            "is what the share of solved problems changes from the lower half to the upper "
-            "one; `exponent` is that of the CPU time of the solved ones, with the interval of "
-            "a bootstrap over problems."
+            "The problems of a set are halved at the median of a fact. `shift of the share` is "
+            "the share of solved problems in the upper half, less that in the lower half. The CPU "
+            "time of solved problems grows with a power of the fact: `exponent` is this power, "
+            "with the interval of a bootstrap over problems."
         )
         yield from table(
             "published-effects", effects, "The effect of a fact on a family of methods", ""

@@ -1,4 +1,4 @@
-"""One campaign on two machines, or on one under two loads: do calibrated times agree?
+"""One campaign on two machines, or on one under two loads: the ratio of times.
 
     fclib bench --calibrate                       # on each machine
     fclib bench CAMPAIGN --store A.sqlite         # on one
@@ -78,7 +78,8 @@ def main() -> None:
     parser.add_argument("--results", help="store the table as docs/results/NAME.csv")
     own = parser.parse_args()
     first, second = map(calibration_of, own.stores)
-    rows = rows_of(*map(times_of, own.stores), ratio_of(second, first), own.least)
+    times = [times_of(path) for path in own.stores]
+    rows = rows_of(times[0], times[1], ratio_of(second, first), own.least)
     for row in rows:
         print("  ".join(f"{value!s:>16}" for value in row.values()))
     if own.results:

@@ -1,7 +1,8 @@
 """How two machines compare: the CPU times of a fixed set of solves on each of them.
 
 A pair of machines has a ratio for each solve. The ratio of times of the two machines is the
-geometric mean of these, and its interval is that of Student's t of their logarithms.
+geometric mean of these. Solvers differ: another one may gain more from the faster machine. So the
+interval is that in which the ratio of a further solve lies, by Student's t of the logarithms.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Times of a machine over those of another."""
+    """Times of a machine over those of another, with the interval of those of a single solver."""
 
     mean: float
     low: float  # ends of the interval of LEVEL
@@ -104,7 +105,7 @@ def ratio_of(mine: Calibration, theirs: Calibration) -> Ratio:
     names = list(mine.seconds)
     logs = np.log([mine.seconds[name] / theirs.seconds[name] for name in names])
     mean, count = float(logs.mean()), len(logs)
-    half = stats.t.ppf(0.5 + LEVEL / 2, count - 1) * logs.std(ddof=1) / np.sqrt(count)
+    half = stats.t.ppf(0.5 + LEVEL / 2, count - 1) * logs.std(ddof=1) * np.sqrt(1 + 1 / count)
     return Ratio(*(float(np.exp(mean + sign * half)) for sign in (0, -1, 1)))
 
 

@@ -107,7 +107,7 @@ class Commands(TyperGroup):
 app = typer.Typer(
     name="fclib",
     cls=Commands,
-    help="Frictional contact problems, and a test bench for the solvers of them. COMMAND --help"
+    help="Frictional contact problems, and a test bench for their solvers. COMMAND --help"
     " shows the options of a command, --version the version.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -56,8 +56,8 @@ SETS: dict[str, tuple[str, str]] = {
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("1", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
-    "hard": ("1", "what at most half of the solvers solve, beside standard"),
-    "open": ("1", "what nobody has solved yet"),
+    "hard": ("1", "problems that at most half of the solvers solve; none is in standard"),
+    "open": ("1", "problems that nobody has solved yet"),
     "sequences": ("1", "simulations of 100 steps, to start from the step before"),
     "tiny": ("1", "one problem of each kind; comes with the package"),
 }

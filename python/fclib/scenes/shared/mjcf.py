@@ -188,8 +188,13 @@ def rotations(random: np.random.Generator, count: int) -> npt.NDArray[np.float64
     return unit
 
 
-def surface(mu: float, mu_r: float | None = None) -> str:
-    """The attributes of a geometry's friction; with mu_r [m] its contacts roll, d = 5."""
+def surface(mu: float, mu_r: float | None = None, mu_s: float | None = None) -> str:
+    """The attributes of a geometry's friction; with mu_r [m] its contacts roll, d = 5.
+
+    With mu_s [m] alone they resist spin, d = 4.
+    """
+    if mu_s is not None:
+        return f'friction="{mu!r} {mu_s!r} 0" condim="4"'
     if mu_r is None:
         return f'friction="{mu!r}" condim="3"'
     return f'friction="{mu!r} 0 {mu_r!r}" condim="6"'

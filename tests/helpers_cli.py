@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from click.testing import Result
 from typer.testing import CliRunner
 
 from fclib import cli
@@ -51,6 +50,6 @@ def tables(store: Path, *arguments: str) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def invoke(*arguments: object) -> Result:
+def invoke(*arguments: object) -> Any:
     """A command, and its output as one text in which both streams are."""
     return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])

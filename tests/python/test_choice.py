@@ -363,7 +363,7 @@ def add(
 ) -> None:
     """A run of a planted store; without a time it has failed."""
     facts = facts_of(row["digest"], row["problem"], family=row["scene"])
-    how = {"tol": 1e-8, "merit": "both", "renumber": True}
+    how: dict[str, Any] = {"tol": 1e-8, "merit": "both", "renumber": True}
     add_run(store, facts, solver, seconds, **how, **settings)
 
 

@@ -83,9 +83,8 @@ def test_files_keep_every_number(law: str, d: int, seed: int, tmp_path: Path) ->
     path = tmp_path / "spin.hdf5"
     for problem in (local, as_global(local)):
         fclib.write(path, problem, fclib.Solution(r=r))
-        back = fclib.read(path)
+        back: Any = fclib.read(path)
         assert type(back) is type(problem)
-        assert isinstance(back, (fclib.LocalSpinProblem, fclib.GlobalSpinProblem))
         np.testing.assert_array_equal(back.mu_s, problem.mu_s)
         np.testing.assert_array_equal(back.mu_r, problem.mu_r)
         assert (back.spacedim, back.coupled) == (d, problem.coupled)

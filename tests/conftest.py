@@ -96,9 +96,10 @@ def root() -> Path:
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """The folder of real problems: $FCLIB_DATA, or shared/data/real beside the repository."""
-    default = TESTS.parent.parent / "shared" / "data" / "real"
-    folder = Path(os.environ.get("FCLIB_DATA", default))
+    """The folder of real problems; skips a test if it is not there."""
+    from helpers import real_folder
+
+    folder = real_folder()
     if not folder.is_dir():
         pytest.skip(f"there are no real problems in {folder}; FCLIB_DATA names another folder")
     return folder

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
+import os
 import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,6 +24,12 @@ Array: TypeAlias = npt.NDArray[np.float64]
 STORAGES = ("csr", "csc", "coo", "dense")
 
 CASES = Path(__file__).resolve().parents[2] / "shared" / "data" / "cases"
+
+
+def real_folder() -> Path:
+    """The folder of real problems: $FCLIB_DATA, or shared/data/real beside the repository."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data" / "real"
+    return Path(os.environ.get("FCLIB_DATA", default))
 
 
 def case(name: str) -> Path:
@@ -403,6 +413,22 @@ def planted_spin(
     return problem, r.ravel()
 
 
+def as_global(problem: Any) -> Any:
+    """The contacts of a local problem on bodies: H = I, M = W^-1."""
+    mass = np.linalg.inv(dense(problem.W))
+    mass = 0.5 * (mass + mass.T)
+    law = {name: getattr(problem, name, None) for name in ("mu", "mu_s", "mu_r", "coupled")}
+    kind = getattr(fclib, type(problem).__name__.replace("Local", "Global"))
+    return kind(
+        spacedim=problem.spacedim,
+        M=mass,
+        H=np.eye(problem.m),
+        f=mass @ problem.q,
+        w=np.zeros(problem.m),
+        **{name: value for name, value in law.items() if value is not None},
+    )
+
+
 def auto_chain() -> list[str]:
     """The stages of `auto`, a line each."""
     (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")
@@ -421,6 +447,29 @@ def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fcli
     q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)
     d = q.size // mu.size if mu.size else 3
     return fclib.LocalProblem(spacedim=d, W=sp.csr_array(np.asarray(W, float)), q=q, mu=mu)
+
+
+def ring(count: int = 3) -> fclib.GlobalProblem:
+    """Walls that close on a body from all sides: no doubles make their normals cancel."""
+    angles = 2 * np.pi * np.arange(count) / count + 0.1
+    frames = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
+    w = np.zeros(2 * count)
+    w[::2] = -1
+    return fclib.GlobalProblem(
+        spacedim=2, M=np.eye(2), H=np.hstack(frames), f=[0.3, -0.2], w=w, mu=np.full(count, 0.5)
+    )
+
+
+def script(path: str) -> ModuleType:
+    """A script of this repository, as a module."""
+    place = Path(__file__).parents[1] / path
+    spec = importlib.util.spec_from_file_location(place.stem, place)
+    assert spec is not None
+    assert spec.loader is not None
+    found = importlib.util.module_from_spec(spec)
+    sys.modules[place.stem] = found  # dataclasses look for it there
+    spec.loader.exec_module(found)
+    return found
 
 
 def git(*words: str) -> str:

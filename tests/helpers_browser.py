@@ -1,8 +1,10 @@
 """Chromium for tests of pages: without windows where there is such a one."""
 
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,19 @@ def chromium() -> Iterator[Any]:
             opened.close()
             return
         pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """The address of a folder, as `fclib report --serve` serves one."""
+    from fclib.report import serving
+
+    with serving.server(folder) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/"
+        finally:
+            server.shutdown()
 
 
 def colours(picture: Any) -> int:

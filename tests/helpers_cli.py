@@ -1,11 +1,15 @@
 """Commands of ``fclib``, run in the process of the tests."""
 
+import json
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import BytesIO, TextIOWrapper
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
+
+from typer.testing import CliRunner
 
 from fclib import cli
 
@@ -33,3 +37,19 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
             code = end.code or 0
     said = (stream.bytes.getvalue().decode() for stream in (out, err))
     return subprocess.CompletedProcess(command, code, *said)
+
+
+def tables(store: Path, *arguments: str) -> dict[str, list[dict[str, Any]]]:
+    """What `fclib profile --json` prints, by table."""
+    done = run("profile", store, "--json", *arguments)
+    assert done.returncode == 0, done.stderr
+    found: dict[str, list[dict[str, Any]]] = {}
+    for line in done.stdout.splitlines():
+        record = json.loads(line)
+        found.setdefault(record.pop("table"), []).append(record)
+    return found
+
+
+def invoke(*arguments: object) -> Any:
+    """A command, and its output as one text in which both streams are."""
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])

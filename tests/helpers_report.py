@@ -16,6 +16,7 @@ import pytest
 import fclib
 from fclib.bench import Job, Limits, ProblemFacts, Record, SolverChoice, Store
 from fclib.bench.problems import look
+from helpers_bench import facts_of
 
 LABELS = ["auto", "nsgs", "under_score", "rare"]
 NAMES = {"auto": "auto", "under_score": "nsn-ac"}
@@ -106,16 +107,11 @@ def add_runs(
 def made_facts(count: int) -> list[ProblemFacts]:
     """Problems that are nowhere but in a store."""
     return [
-        ProblemFacts(
-            hash=hashlib.sha256(str(k).encode()).hexdigest(),
-            name=f"{k:05d}",
+        facts_of(
+            hashlib.sha256(str(k).encode()).hexdigest(),
+            f"{k:05d}",
             family=f"Family{k % 7}",
             path=f"/none/{k:05d}.hdf5",
-            kind="local",
-            formulation="3DFC",
-            spacedim=3,
-            n=0,
-            p=0,
             nc=1 + k % 500,
             nnz=9 * (1 + k % 500),
             title=f"Problem {k}",

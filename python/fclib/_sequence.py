@@ -36,6 +36,14 @@ def expanded(path: Path) -> list[Path]:
     return [Path(_core.step_path(path, k)) for k in range(len(found))]
 
 
+def steps_or_file(path: Path) -> list[Path]:
+    """The steps of a sequence, or the file itself: reading says what is wrong with it."""
+    try:
+        return expanded(path)
+    except _core.Error:
+        return [path]
+
+
 def name_of(path: Path) -> str:
     """A name for a file of a problem, without folder and suffix: run-000017 for a step."""
     file, step = place_of(path)

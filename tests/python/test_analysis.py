@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -28,20 +27,16 @@ from helpers import (
     planted_local,
     planted_rolling,
     project,
+    real_folder,
+    ring,
 )
 from helpers_cli import run
 
 some = hypothesis.settings(deadline=None, max_examples=20, derandomize=True)
 
 
-def folder() -> Path:
-    """As the fixture real_data, for what is collected before fixtures run."""
-    default = Path(__file__).parents[3] / "shared" / "data" / "real"
-    return Path(os.environ.get("FCLIB_DATA", default))
-
-
-FOUND = sorted(folder().glob("*/*.hdf5"))
-needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {folder()}")
+FOUND = sorted(real_folder().glob("*/*.hdf5"))
+needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {real_folder()}")
 
 
 def few_contacts() -> list[Any]:
@@ -120,7 +115,7 @@ def test_ranks_are_those_of_dense_algebra(path: Path) -> None:
 
 @needs_data
 def test_a_real_problem_has_a_reference_solution() -> None:
-    path = folder() / "local3d" / "Capsules-i125-1213.hdf5"
+    path = real_folder() / "local3d" / "Capsules-i125-1213.hdf5"
     if not path.is_file():
         pytest.skip(f"{path} is not there")
     problem = fclib.read(path)
@@ -225,19 +220,12 @@ def test_a_body_between_closing_walls(d: int, mu: float, others: int) -> None:
 @pytest.mark.parametrize("count", [3, 4, 7])
 def test_a_ring_of_walls_that_pushes_a_body_out_of_itself(count: int) -> None:
     # normals that hold each other: no motion leaves all walls that come nearer
-    angles = 2 * np.pi * np.arange(count) / count + 0.1
-    frames = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
-    H = np.hstack(frames)
-    w = np.zeros(2 * count)
-    w[::2] = -1
-    problem = fclib.GlobalProblem(
-        spacedim=2, M=np.eye(2), H=H, f=[0.3, -0.2], w=w, mu=np.full(count, 0.5)
-    )
+    problem = ring(count)
     found = analysis.analyze(problem)
     assert found.existence.verdict == analysis.PROVEN_NOT
     assert_no_solution(problem, found.certificate)
     # where they go away there is a solution, strictly inside K*
-    apart = analysis.analyze(problem.replace(w=-w))
+    apart = analysis.analyze(problem.replace(w=-problem.w))
     assert apart.existence.verdict == analysis.EXISTS_SLATER
 
 

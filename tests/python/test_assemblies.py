@@ -1,4 +1,4 @@
-"""Families assembled directly: what they say, and mechanics with a closed form."""
+"""What families say; those assembled directly, and mechanics with a closed form."""
 
 import dataclasses
 import decimal
@@ -21,11 +21,12 @@ from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
 
 FAMILIES: dict[str, Any] = dict(scenes.assemblies())
+ALL: dict[str, Any] = FAMILIES | dict(scenes.families())
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", ALL)
 def test_family_says_what_it_is(name: str) -> None:
-    family = FAMILIES[name]
+    family = ALL[name]
     for text in ("title", "description", "application", "authors", "friction", "collection"):
         assert getattr(family, text).strip(), text
     for parameter in dataclasses.fields(family):

@@ -22,8 +22,9 @@ import helpers_cli
 from fclib import bench
 from fclib._solve import MERITS
 from fclib.bench import campaign, profiles
-from fclib.bench.job import Job, ProblemFacts, Record
+from fclib.bench.job import Job, Record
 from fclib.cli import app
+from helpers_bench import facts_of
 
 # CPU times of three solvers on four problems; None: failed
 TIMES: dict[str, list[float | None]] = {
@@ -49,20 +50,8 @@ def fill(
         number = store.begin("hand", 'name = "hand"', 12, 0, node)
         for solver, own in times.items():
             for k, time in enumerate(own):
-                problem = ProblemFacts(
-                    hash=f"hash{k}",
-                    name=f"problem{k}",
-                    family="few" if k < 2 else "many",
-                    path="",
-                    kind="local",
-                    formulation="local 3D",
-                    spacedim=3,
-                    n=0,
-                    p=0,
-                    nc=CONTACTS[k],
-                    nnz=9,
-                    title="",
-                )
+                family = "few" if k < 2 else "many"
+                problem = facts_of(f"hash{k}", f"problem{k}", family=family, nc=CONTACTS[k])
                 job = Job(
                     problem,
                     bench.SolverChoice(solver, {}, version),

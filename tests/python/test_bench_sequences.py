@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
-from fclib import bench, cli
+from fclib import bench
 from fclib.bench import cluster, pool, profiles
 from fclib.bench.job import Guess, Job, Record
 from fclib.collections.references import guess_of
 from fclib.report.runs import Campaigns
 from helpers import planted_local
+from helpers_cli import tables
 
 NC = 5
 STEPS = 6
@@ -427,21 +427,12 @@ def test_warm_beside_cold(quiet: Path, with_a_failure: Path) -> None:
 
 
 def test_the_command_tells_them_apart(quiet: Path, tmp_path: Path) -> None:
-    def tables(*options: str) -> dict[str, list[dict[str, Any]]]:
-        shown = CliRunner().invoke(cli.app, ["profile", str(quiet), "--json", *options])
-        assert shown.exit_code == 0, shown.output
-        found: dict[str, list[dict[str, Any]]] = {}
-        for line in shown.stdout.splitlines():
-            row = json.loads(line)
-            found.setdefault(row["table"], []).append(row)
-        return found
-
-    assert {row["of"] for row in tables()["summary"]} == {STEPS}
-    assert {row["of"] for row in tables("--start", "warm")["summary"]} == {STEPS - 1}
-    assert tables()["along"] == tables("--start", "warm")["along"]
+    assert {row["of"] for row in tables(quiet)["summary"]} == {STEPS}
+    assert {row["of"] for row in tables(quiet, "--start", "warm")["summary"]} == {STEPS - 1}
+    assert tables(quiet)["along"] == tables(quiet, "--start", "warm")["along"]
     with Campaigns([quiet]) as report:
         assert {row["start"] for row in report.rows} == {"cold"}
-        assert [{"table": "along"} | row for row in report.overview()["along"]] == tables()["along"]
+        assert report.overview()["along"] == tables(quiet)["along"]
     alone = tmp_path / "cold.sqlite"
     with bench.Store(alone) as store:
         store.merge([quiet])

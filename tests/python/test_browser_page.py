@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import base64
-import functools
-import threading
 from collections.abc import Iterator
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ import pytest
 import browser_module
 import fclib
 import golden_work
-from helpers_browser import chromium
+from helpers_browser import chromium, served
 
 pytestmark = [
     pytest.mark.skipif(bool(browser_module.missing()), reason=browser_module.missing()),
@@ -42,21 +39,11 @@ WORKER = """async ({ data, settings, stop }) => {
 }"""
 
 
-class Quiet(SimpleHTTPRequestHandler):
-    extensions_map = SimpleHTTPRequestHandler.extensions_map | {".mjs": "text/javascript"}
-
-    def log_message(self, *_: Any) -> None:
-        pass
-
-
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """The folder of the module at this machine."""
-    handler = functools.partial(Quiet, directory=str(browser_module.FOLDER))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
+    with served(browser_module.FOLDER) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +64,9 @@ def page(address: str) -> Iterator[Any]:
             ),
         )
         opened.route(
-            f"{address}/", lambda route: route.fulfill(content_type="text/html", body="<p>page</p>")
+            address, lambda route: route.fulfill(content_type="text/html", body="<p>page</p>")
         )
-        opened.goto(f"{address}/")
+        opened.goto(address)
         yield opened
 
 

@@ -1,7 +1,6 @@
 """What the scripts around the build make of what the tools print; the development install."""
 
 import hashlib
-import importlib.util
 import json
 import re
 import shutil
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 
 import rebuild
-from helpers import git
+from helpers import git, script
 
 DEPENDENCIES = """\
 core/a.o: #deps 3, deps mtime 1700000000000000000 (VALID)
@@ -33,23 +32,13 @@ core/gone.o: #deps 1, deps mtime 1 (STALE)
 
 
 @pytest.fixture(scope="module")
-def build_cost(root: Path) -> ModuleType:
-    return script(root, "build_cost")
+def build_cost() -> ModuleType:
+    return script("scripts/build_cost.py")
 
 
 @pytest.fixture(scope="module")
-def coverage_report(root: Path) -> ModuleType:
-    return script(root, "coverage_report")
-
-
-def script(root: Path, name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, root / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look for it there
-    spec.loader.exec_module(module)
-    return module
+def coverage_report() -> ModuleType:
+    return script("scripts/coverage_report.py")
 
 
 # ---- what a build costs
@@ -222,8 +211,8 @@ def test_a_build_that_fails_ends_the_tests(tmp_path: Path) -> None:
 # ---- wheels
 
 
-def test_a_python_takes_the_wheel_of_its_tags(root: Path) -> None:
-    try_wheels = script(root, "try_wheels")
+def test_a_python_takes_the_wheel_of_its_tags() -> None:
+    try_wheels = script("scripts/try_wheels.py")
     names = ("cp310-cp310", "cp311-cp311", "cp312-abi3")
     wheels = [Path(f"fclib-0.1.0-{name}-manylinux_2_28_x86_64.whl") for name in names]
     taken = {minor: try_wheels.wheel_for(minor, wheels) for minor in range(9, 15)}
@@ -279,9 +268,9 @@ def test_another_project_takes_the_c_library_in(root: Path, tmp_path: Path, take
 
 
 def test_a_release_names_its_version_everywhere(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    release = script(root, "release")
+    release = script("scripts/release.py")
     monkeypatch.setattr(release, "ROOT", tmp_path)
     monkeypatch.setattr(release, "git", lambda *words: "")
     (tmp_path / "recipe").mkdir()
@@ -299,10 +288,10 @@ def test_a_release_names_its_version_everywhere(
 
 
 def test_a_release_has_checksums_and_a_list_of_parts(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("cyclonedx", reason="a tool of the tests that is not installed")
-    release = script(root, "release")
+    release = script("scripts/release.py")
     dist = tmp_path / "dist"
     (dist / "collection").mkdir(parents=True)
     name = release.version()

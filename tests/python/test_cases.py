@@ -18,7 +18,7 @@ import scipy.sparse as sp
 import fclib
 from ball_judge import judge
 from fclib import analysis
-from helpers import dense, last_resort
+from helpers import dense, last_resort, ring
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -145,17 +145,6 @@ def test_a_limit_that_loops_hold_gets_no_reaction(path: Path) -> None:
             assert result.error * np.linalg.norm(local.q) <= 1e-11
             assert result.status in ("stalled", "inaccurate"), solver
             assert fclib.merit(problem, result.solution).error == pytest.approx(result.error)
-
-
-def ring(count: int = 3) -> fclib.GlobalProblem:
-    """Walls that close on a body from all sides: no doubles make their normals cancel."""
-    angles = 2 * np.pi * np.arange(count) / count + 0.1
-    frames = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
-    w = np.zeros(2 * count)
-    w[::2] = -1
-    return fclib.GlobalProblem(
-        spacedim=2, M=np.eye(2), H=np.hstack(frames), f=[0.3, -0.2], w=w, mu=np.full(count, 0.5)
-    )
 
 
 def test_a_proof_in_rational_numbers() -> None:

@@ -45,6 +45,7 @@ from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
 from fclib.collections.set_index import DATA
 from fclib.simulate import control_of
+from helpers_cli import invoke
 from workshop.sets import metadata
 
 FAMILIES = collections.families()
@@ -1019,10 +1020,6 @@ ROBOT = """
     <geom type="capsule" size="0.03" fromto="0 0 0 -0.02 0 -0.48" mass="0.5"/></body>
 </body></worldbody></mujoco>
 """
-
-
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_a_set_counts_its_families_without_states_too() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +12,9 @@ import numpy as np
 import pytest
 
 import helpers_cli
-from fclib.bench import Job, Limits, ProblemFacts, Progress, Record, SolverChoice, Store
+from fclib.bench import ProblemFacts, Progress, Record, Store
+from helpers_bench import add_run, facts_of
+from helpers_cli import tables
 
 LIMIT = 10.0
 
@@ -26,56 +27,15 @@ def facts(
     digest: str = "",
 ) -> ProblemFacts:
     """A problem that is nowhere but in a store."""
-    return ProblemFacts(
-        hash=(digest or f"{family}{name}{form}").ljust(64, "0"),
-        name=f"{name}-{form}",
+    return facts_of(
+        (digest or f"{family}{name}{form}").ljust(64, "0"),
+        f"{name}-{form}",
         family=family,
         path=f"{folder}/{family}/{name}-{form}.hdf5",
         kind=form,
         formulation="G3DFC" if form == "global" else "3DFC",
-        spacedim=3,
         n=6,
-        p=0,
-        nc=4,
-        nnz=9,
-        title="",
     )
-
-
-def add(
-    store: Path,
-    problem: ProblemFacts,
-    solver: str,
-    seconds: float | None,
-    status: str = "",
-    tol: float = 1e-6,
-    repeat: int = 0,
-) -> None:
-    """A run; without a time it has failed."""
-    status = status or ("converged" if seconds is not None else "cpu_limit")
-    record = Record(
-        status=status,
-        cpu_s=seconds,
-        total_cpu_s=seconds,
-        wall_s=seconds,
-        merits={"error": tol / 2 if status == "converged" else 1.0},
-        machine={"node": "here"},
-    )
-    limits = Limits(LIMIT, LIMIT, 1000)
-    with Store(store) as opened:
-        choice = SolverChoice(solver, {}, "1")
-        assert opened.add(Job(problem, choice, tol, limits, repeat, 1), record)
-
-
-def tables(store: Path, *arguments: str) -> dict[str, list[dict[str, Any]]]:
-    """What `fclib profile --json` prints, by table."""
-    done = helpers_cli.run("profile", str(store), "--json", *arguments)
-    assert done.returncode == 0, done.stderr
-    found: dict[str, list[dict[str, Any]]] = {}
-    for line in done.stdout.splitlines():
-        record = json.loads(line)
-        found.setdefault(record.pop("table"), []).append(record)
-    return found
 
 
 def solved(rows: Sequence[dict[str, Any]]) -> dict[str, tuple[int, int]]:
@@ -95,8 +55,8 @@ def test_a_solver_that_takes_the_easy_part_is_not_ranked_first(store: Path) -> N
     """It is slower than another one on each problem that it takes."""
     for k in range(8):
         easy = k < 6
-        add(store, facts(f"{k:04d}"), "apgd", 2.7e-4 if easy else 1.0)
-        add(
+        add_run(store, facts(f"{k:04d}"), "apgd", 2.7e-4 if easy else 1.0)
+        add_run(
             store,
             facts(f"{k:04d}"),
             "plugin",
@@ -117,8 +77,8 @@ def test_a_solver_that_takes_the_easy_part_is_not_ranked_first(store: Path) -> N
 def test_a_solver_with_few_runs_takes_nothing_from_the_others(store: Path) -> None:
     for k in range(6):
         for name in ("apgd", "nsgs"):
-            add(store, facts(f"{k:04d}"), name, 1.0)
-    add(store, facts("0000"), "rare", 0.1)
+            add_run(store, facts(f"{k:04d}"), name, 1.0)
+    add_run(store, facts("0000"), "rare", 0.1)
     found = tables(store)
     assert set(solved(found["summary"])) == {"virtual best", "apgd", "nsgs"}
     assert solved(found["summary"])["apgd"] == (6, 6)
@@ -135,8 +95,8 @@ def test_a_legend_says_how_many_of_how_many(store: Path, tmp_path: Path) -> None
     pytest.importorskip("matplotlib")
     for k in range(3):
         for tol in (1e-4, 1e-6):
-            add(store, facts(f"{k:04d}"), "apgd", 1.0, tol=tol)
-            add(store, facts(f"{k:04d}"), "nsgs", 1.0 if k else None, tol=tol)
+            add_run(store, facts(f"{k:04d}"), "apgd", 1.0, tol=tol)
+            add_run(store, facts(f"{k:04d}"), "nsgs", 1.0 if k else None, tol=tol)
     done = helpers_cli.run("profile", str(store), "--out", str(tmp_path), "--format", "svg")
     assert done.returncode == 0, done.stderr
     drawn = sorted(tmp_path.glob("*.svg"))
@@ -148,8 +108,8 @@ def test_a_legend_says_how_many_of_how_many(store: Path, tmp_path: Path) -> None
 
 
 def test_a_comparison_of_nothing_says_what_to_do(store: Path) -> None:
-    add(store, facts("0000"), "apgd", 1.0)
-    add(store, facts("0001"), "nsgs", 1.0)
+    add_run(store, facts("0000"), "apgd", 1.0)
+    add_run(store, facts("0001"), "nsgs", 1.0)
     done = helpers_cli.run("profile", str(store))
     assert done.returncode == 1
     assert "--own-set" in done.stderr
@@ -159,8 +119,8 @@ def test_a_comparison_of_nothing_says_what_to_do(store: Path) -> None:
 
 
 def test_a_proof_that_was_checked_is_a_success(store: Path) -> None:
-    add(store, facts("0000"), "auto", 0.5, "infeasible")
-    add(store, facts("0000"), "nsgs", None)
+    add_run(store, facts("0000"), "auto", 0.5, "infeasible")
+    add_run(store, facts("0000"), "nsgs", None)
     assert solved(tables(store)["summary"]) == {
         "virtual best": (1, 1),
         "auto": (1, 1),
@@ -182,9 +142,9 @@ def test_both_forms_of_a_problem_are_one(store: Path) -> None:
     for k in range(3):
         for form in ("global", "local"):
             # the local form is quicker, and is not the one that counts
-            add(store, facts(f"{k:04d}", form=form), "apgd", 2.0 if form == "global" else 1.0)
+            add_run(store, facts(f"{k:04d}", form=form), "apgd", 2.0 if form == "global" else 1.0)
             takes = form == "local"
-            add(
+            add_run(
                 store,
                 facts(f"{k:04d}", form=form),
                 "plugin",
@@ -207,7 +167,7 @@ def test_problems_of_one_name_are_two(store: Path) -> None:
     for folder, digest in (("/a/set", "one"), ("/b/set", "two"), ("/a/other", "three")):
         for form in ("global", "local"):
             problem = facts("0001", form=form, folder=folder, digest=f"{digest}-{form}")
-            add(store, problem, "apgd", 1.0)
+            add_run(store, problem, "apgd", 1.0)
     rows = tables(store)["summary"]
     # of set/Family/0001 nothing tells which forms belong together
     assert solved(rows)["apgd"] == (5, 5)
@@ -215,8 +175,8 @@ def test_problems_of_one_name_are_two(store: Path) -> None:
 
 def test_each_tolerance_has_its_own_table(store: Path) -> None:
     for k in range(4):
-        add(store, facts(f"{k:04d}"), "apgd", 1.0, tol=1e-4)
-        add(store, facts(f"{k:04d}"), "apgd", 8.0 if k else None, tol=1e-8)
+        add_run(store, facts(f"{k:04d}"), "apgd", 1.0, tol=1e-4)
+        add_run(store, facts(f"{k:04d}"), "apgd", 8.0 if k else None, tol=1e-8)
     found = tables(store)
     assert [(row["tol"], row["solver"], row["solved"]) for row in found["summary"]] == [
         *((1e-4, "virtual best", 4), (1e-4, "apgd", 4)),
@@ -231,10 +191,10 @@ def test_each_tolerance_has_its_own_table(store: Path) -> None:
 
 def test_a_large_family_decides_no_mean(store: Path) -> None:
     for k in range(9):
-        add(store, facts(f"{k:04d}", "Large"), "apgd", 1.0)
-        add(store, facts(f"{k:04d}", "Large"), "nsgs", 4.0)
-    add(store, facts("0000", "Small"), "apgd", 100 * 1e-1)
-    add(store, facts("0000", "Small"), "nsgs", None)
+        add_run(store, facts(f"{k:04d}", "Large"), "apgd", 1.0)
+        add_run(store, facts(f"{k:04d}", "Large"), "nsgs", 4.0)
+    add_run(store, facts("0000", "Small"), "apgd", 100 * 1e-1)
+    add_run(store, facts("0000", "Small"), "nsgs", None)
     of = {row["solver"]: row for row in tables(store, "--shift", "1e-9")["summary"]}
     assert of["apgd"]["mean"] == pytest.approx(math.sqrt(1.0 * 10.0), rel=1e-6)
     assert of["nsgs"]["mean"] == pytest.approx(math.sqrt(4.0 * 10 * LIMIT), rel=1e-6)

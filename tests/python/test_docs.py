@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 import json
 import re
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from html.parser import HTMLParser
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -20,7 +17,7 @@ import pytest
 
 import fclib
 from fclib.collections import plan
-from helpers_browser import chromium
+from helpers_browser import chromium, served
 
 pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
 pytest.importorskip("mujoco")
@@ -269,16 +266,11 @@ def test_figures_of_the_contact_page_are_solved_in_it(site: Path, browser: Any) 
     wrong: list[str] = []
     page.on("console", lambda message: wrong.append(message.text))
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    handler = functools.partial(Quiet, directory=str(site))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://127.0.0.1:{server.server_port}/"
+    with served(site) as address:
         page.on(
             "request",
             lambda r: None if r.url.startswith((address, "data:")) else wrong.append(r.url),
         )
-        # a browser asks for it by itself
-        page.route("**/favicon.ico", lambda route: route.fulfill(status=204))
         page.goto(f"{address}contact-problem.html")
         page.locator("div[data-figure=arch][data-alive]").wait_for()
         assert page.locator("img[src*=contact-]:visible").count() == 0
@@ -310,16 +302,8 @@ def test_figures_of_the_contact_page_are_solved_in_it(site: Path, browser: Any) 
         assert "stands" in figure(page, "arch", {"stones": 7})
         assert "stands" in figure(page, "arch", {"thickness": 0.3, "stones": 15, "μ": 0.32})
         assert "falls" in figure(page, "arch", {"μ": 0.3})
-        server.shutdown()
     page.close()
     assert not wrong
-
-
-class Quiet(SimpleHTTPRequestHandler):
-    extensions_map = SimpleHTTPRequestHandler.extensions_map | {".mjs": "text/javascript"}
-
-    def log_message(self, *_: Any) -> None:
-        pass
 
 
 FIRST = {

@@ -21,9 +21,10 @@ import pytest
 import fclib
 import helpers_cli
 from fclib import _core, _registry, bench
-from fclib.bench.job import Limits, ProblemFacts, Record, SolverChoice
+from fclib.bench.job import Limits, Record, SolverChoice
 from fclib.collections import catalog
 from helpers import planted_local
+from helpers_bench import facts_of
 from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("pyarrow")
@@ -40,9 +41,7 @@ def problem(tmp_path: Path) -> Path:
 
 def store_of(path: Path, solver: SolverChoice, message: str = "", **facts: Any) -> Path:
     """A store of one run, by a solver of this name."""
-    given: dict[str, Any] = {"hash": "h", "name": "p", "family": "f", "path": "", "kind": "local"}
-    given |= {"formulation": "3DFC", "spacedim": 3, "nc": 1, "nnz": 9, "title": "t", "n": 0, "p": 0}
-    known = ProblemFacts(**given | facts)
+    known = facts_of(**{"hash": "h", "name": "p", "family": "f", "title": "t", **facts})
     job = bench.Job(known, solver, 1e-4, Limits(1.0, 1.0, 100.0), 0, 1)
     record = Record("converged", message, cpu_s=0.1, iterations=3, merits={"error": 1e-5})
     record.machine = {"node": "here"}

@@ -13,6 +13,7 @@ from fclib.collections import published
 pytest.importorskip("mujoco")
 
 from fclib.simulate import MujocoModel, Step, simulate
+from helpers_simulate import force_on, mujoco_of
 
 DEEPEST = 0.02  # penetration, of the smallest body's diameter
 
@@ -21,24 +22,6 @@ def depth(step: Step) -> float:
     """The largest penetration, of the diameter of the smallest body."""
     size: Any = step.model.smallest_size
     return float(np.max(-step.contacts.gap, initial=0.0) / (2 * size))
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def force_on(step: Step, body: str) -> Any:
-    """(3) what the contacts press a body with [N]."""
-    model = mujoco_of(step)
-    bodies = model.geom_bodyid[step.contacts.pair]
-    own = bodies == model.body(body).id
-    sign = own[:, 1].astype(float) - own[:, 0]
-    d = step.problem.spacedim
-    impulses = np.reshape(step.result.solution.r, (-1, d))
-    turned = np.einsum("ci,cij->cj", impulses, step.contacts.frame[:, :d])
-    return sign @ turned / model.opt.timestep
 
 
 # ---- all of them
@@ -82,26 +65,6 @@ def test_stored_states_have_contacts_and_no_deep_ones(name: str) -> None:
             states.number[0],
             states.number[-1],
         ]
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("GearTrain", {"gears": 1}),
-        ("GearTrain", {"clearance": 0.0}),
-        ("ChainMail", {"across": 2}),
-        ("ChainMail", {"wire": 0.02}),
-        ("ChainMail", {"restitution": 0.5}),
-        ("ShearBox", {"spread": 1.0}),
-        ("ShearBox", {"restitution": 0.5}),
-        ("Rover", {"base": 0.1}),
-        ("Rover", {"restitution": 0.5}),
-        ("Hand", {"fingers": 2}),
-    ],
-)
-def test_machines_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        scenes.get(name)(**wrong)
 
 
 # ---- gears

@@ -16,18 +16,8 @@ from fclib.scenes.shared import masonry
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 
-from fclib.simulate import MujocoModel, Step, simulate
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def last_of(scene: scenes.Scene, steps: int, **settings: Any) -> Step:
-    *_, last = simulate(scene, steps, **settings)
-    return last
+from fclib.simulate import Step, simulate
+from helpers_simulate import last_of, mujoco_of
 
 
 def places(step: Step) -> npt.NDArray[np.float64]:
@@ -168,23 +158,6 @@ def test_arch_cracks_into_hinges_where_its_supports_spread(
     # it stands on its hinges: nothing is faster than a few times the spread
     assert np.abs(last.velocity).max() < max(5 * spread, 1e-5)
     assert places(last)[:, 2].max() > 0.9 * (family.springing + family.radius)
-
-
-@pytest.mark.parametrize(
-    ("name", "smaller"),
-    [
-        ("Arch", {"voussoirs": 8, "thickness": 0.15, "spread": 0.0}),
-        ("LowWall", {"stretchers": 2, "courses": 2, "push": 0.0}),
-    ],
-)
-def test_energy_does_not_grow(name: str, smaller: dict[str, Any]) -> None:
-    energy = np.array(
-        [
-            step.model.energy()
-            for step in simulate(scenes.get(name)(**smaller).scene(), 60, tol=1e-10)
-        ]
-    )
-    assert np.diff(energy).max() < 1e-7 * np.abs(energy).max()
 
 
 # ---- walls

@@ -15,17 +15,7 @@ from fclib.scenes.walker import SHIN, THIGH, Walker
 pytest.importorskip("mujoco")
 
 from fclib.simulate import MujocoModel, Step, simulate
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def last_of(scene: scenes.Scene, steps: int) -> Step:
-    *_, last = simulate(scene, steps)
-    return last
+from helpers_simulate import last_of, mujoco_of
 
 
 def violation(step: Step) -> float:

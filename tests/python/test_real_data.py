@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,21 +12,15 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import columns
+from helpers import columns, real_folder
 
 KINDS = ("local3d", "global3d", "local2d", "global2d", "condensed3d")
 EXACT = 1e-12
 SWEEPS = 20_000  # a problem
 
 
-def folder() -> Path:
-    """As the fixture real_data, for what is collected before fixtures run."""
-    default = Path(__file__).parents[3] / "shared" / "data" / "real"
-    return Path(os.environ.get("FCLIB_DATA", default))
-
-
 def files(*kinds: str) -> list[Path]:
-    return [path for kind in kinds for path in sorted((folder() / kind).glob("*.hdf5"))]
+    return [path for kind in kinds for path in sorted((real_folder() / kind).glob("*.hdf5"))]
 
 
 def name_of(path: Path) -> str:
@@ -36,7 +29,7 @@ def name_of(path: Path) -> str:
 
 FOUND = files(*KINDS)
 ALL = [pytest.param(path, id=name_of(path)) for path in FOUND] or [pytest.param(None)]
-needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {folder()}")
+needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {real_folder()}")
 
 
 @pytest.fixture(scope="module")
@@ -110,29 +103,28 @@ def test_rewriting_and_reading_back_is_equal(path: Path, tmp_path: Path) -> None
             np.testing.assert_array_equal(getattr(solution, name), getattr(solution_again, name))
 
 
-def test_most_3d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
-    paths = files("local3d", "global3d")
-    assert len(paths) >= 30
+@pytest.mark.parametrize(
+    ("kinds", "least", "solver", "share"),
+    [
+        (("local3d", "global3d"), 30, "nsgs", 0.8),
+        (("local2d", "global2d"), 1, "nsgs", 0.8),
+        (("rolling", "rolling_local"), 5, "auto", 1.0),
+    ],
+)
+def test_most_problems_are_solved_and_every_error_is_true(
+    kinds: tuple[str, ...], least: int, solver: str, share: float, real_data: Path
+) -> None:
+    paths = files(*kinds)
+    assert len(paths) >= least
     solved = []
     for path in paths:
         problem = fclib.read(path)
-        result = fclib.solve(problem, "nsgs", 1e-8, max_iterations=SWEEPS)
+        result = fclib.solve(problem, solver, 1e-8, max_iterations=SWEEPS)
         assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
         assert result.converged == (result.error <= 1e-8)
         if result.converged:
             solved.append(path.name)
-    assert len(solved) >= 0.8 * len(paths), sorted({path.name for path in paths} - set(solved))
-
-
-def test_2d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
-    paths = files("local2d", "global2d")
-    solved = 0
-    for path in paths:
-        problem = fclib.read(path)
-        result = fclib.solve(problem, "nsgs", 1e-8, max_iterations=SWEEPS)
-        assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
-        solved += result.converged
-    assert solved >= 0.8 * len(paths)
+    assert len(solved) >= share * len(paths), sorted({path.name for path in paths} - set(solved))
 
 
 @pytest.mark.parametrize("solver", ["aclm", "tresca"])
@@ -188,16 +180,6 @@ def test_texts_are_those_of_the_file_and_end_where_they_end(real_data: Path) -> 
             for name in ("title", "description", "math_info"):
                 stored = group[name][()].split(b"\0")[0] if name in group else b""
                 assert getattr(problem.info, name) == stored.decode(errors="replace"), path.name
-
-
-def test_rolling_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
-    paths = files("rolling", "rolling_local")
-    assert len(paths) >= 5
-    for path in paths:
-        problem = fclib.read(path)
-        result = fclib.solve(problem, "auto", 1e-8, max_iterations=SWEEPS)
-        assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
-        assert result.converged, path.name
 
 
 def test_a_layout_that_is_not_known_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -15,12 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, KDTree
-from typer.testing import CliRunner
 
 import fclib
 from fclib._geometry import rotations
 from fclib.bench import Store, profiles
-from fclib.cli import app
 from fclib.collections import set_index
 from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
 from fclib.report.libraries import as_script
@@ -29,6 +27,7 @@ from fclib.report.recipes import recipes
 from fclib.report.solids import MESH, record_of, solids_of
 from fclib.report.view import hulls_of
 from fclib.scenes.shared.family import Assembled
+from helpers_cli import invoke
 from helpers_report import (
     LABELS,
     TOLERANCES,
@@ -273,7 +272,7 @@ def test_without_the_packages_it_is_said_what_to_install(
     assert (tmp_path / "site" / "assets" / "plotly.js").is_file()
     assert [path.name for path in tmp_path.iterdir()] == ["site"]
     file = sorted(collection.rglob("*-local.hdf5"))[-1]
-    done = run("view", file, "--out", tmp_path / "v.html")
+    done = invoke("view", file, "--out", tmp_path / "v.html")
     assert done.exit_code == 1
     assert not (tmp_path / "v.html").exists()
 
@@ -623,30 +622,26 @@ def test_views_of_any_problem(kind: str, tmp_path: Path) -> None:
 # ---- the command line
 
 
-def run(*words: object) -> Any:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
 def test_report_by_the_command_line(store: Path, collection: Path, tmp_path: Path) -> None:
-    done = run("report", store, "--catalog", collection, "--out", tmp_path / "s", "--views", 1)
+    done = invoke("report", store, "--catalog", collection, "--out", tmp_path / "s", "--views", 1)
     assert done.exit_code == 0, done.output
     assert "1 views" in done.output
     assert (tmp_path / "s" / "index.html").is_file()
-    assert run("report").exit_code == 2
-    assert run("report", "--pdf", "--catalog", collection).exit_code == 2
-    missing = run("report", tmp_path / "none.sqlite")
+    assert invoke("report").exit_code == 2
+    assert invoke("report", "--pdf", "--catalog", collection).exit_code == 2
+    missing = invoke("report", tmp_path / "none.sqlite")
     assert missing.exit_code == 1
-    assert run("report", "--catalog", tmp_path).exit_code == 1
+    assert invoke("report", "--catalog", tmp_path).exit_code == 1
 
 
 def test_view_by_the_command_line(
     collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = sorted(collection.rglob("*-local.hdf5"))[-1]
-    done = run("view", file, "--out", tmp_path / "v.html")
+    done = invoke("view", file, "--out", tmp_path / "v.html")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "v.html").stat().st_size > 10_000
-    assert run("view", tmp_path / "none.hdf5").exit_code == 1
+    assert invoke("view", tmp_path / "none.hdf5").exit_code == 1
     opened: list[str] = []
 
     def open_page(address: str) -> bool:
@@ -655,7 +650,7 @@ def test_view_by_the_command_line(
 
     monkeypatch.setattr("webbrowser.open", open_page)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert run("view", file).exit_code == 0
+    assert invoke("view", file).exit_code == 0
     (address,) = opened
     assert address.startswith("file:")
     assert address.endswith(f"{file.stem}.html")
@@ -663,7 +658,7 @@ def test_view_by_the_command_line(
 
 def test_figures_for_a_paper(store: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    done = run("report", store, "--pdf", "--out", tmp_path / "paper")
+    done = invoke("report", store, "--pdf", "--out", tmp_path / "paper")
     assert done.exit_code == 0, done.output
     for tol in TOLERANCES:
         folder = tmp_path / "paper" / f"tol-{tol:g}"

@@ -1,12 +1,9 @@
 """The site in a real browser, from the file system: no error, no request, no server."""
 
 import csv
-import functools
 import hashlib
-import http.server
 import io
 import re
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,7 @@ from fclib.bench import profiles
 from fclib.collections import set_index, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers import planted_global
-from helpers_browser import chromium, colours
+from helpers_browser import chromium, colours, served
 from helpers_report import (
     LABELS,
     make_collection,
@@ -883,10 +880,7 @@ def test_a_selection_is_fetched_by_its_list(
     (line,) = (line for line in lines if "collection get" in line)
 
     collections.publish(masonry.parent / "collection", tmp_path / "served")
-    handler = functools.partial(QuietHandler, directory=str(tmp_path / "served"))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://127.0.0.1:{server.server_port}"
+    with served(tmp_path / "served") as address:
         places = {"collection": address, "copy": tmp_path / "served", "again": ""}
         places["again"] = (tmp_path / "served").as_uri()
         for out, place in places.items():
@@ -894,7 +888,6 @@ def test_a_selection_is_fetched_by_its_list(
             words = ["collection", *(known.get(word, word) for word in line.split()[2:])]
             done = CliRunner().invoke(app, words)
             assert done.exit_code == 0, done.output
-        server.shutdown()
     files = [sorted(p.relative_to(out) for p in Path(out).rglob("*.hdf5")) for out in places]
     assert files[0] == files[1] == files[2]
     rows = {row["id"]: row for row in collections.read_catalog("collection").to_pylist()}
@@ -907,13 +900,6 @@ def test_a_selection_is_fetched_by_its_list(
     for context in go.contexts:
         context.close()
     assert not go.wrong
-
-
-class QuietHandler(http.server.SimpleHTTPRequestHandler):
-    """Serves a folder, and says nothing."""
-
-    def log_message(self, *_: Any) -> None:
-        pass
 
 
 SETTLED = "document.getAnimations().every((one) => one.playState !== 'running')"

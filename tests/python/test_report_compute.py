@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,11 +30,11 @@ from fclib.bench.job import Job, Limits, Record, SolverChoice
 from fclib.bench.problems import look
 from fclib.cli import app
 from fclib.collections import catalog
-from fclib.report import Campaigns, ReportError, browser, build_site, serving
+from fclib.report import Campaigns, ReportError, browser, build_site
 from fclib.report.solids import solids_of
 from fclib.report.view import view_of
 from helpers import planted_global, planted_local
-from helpers_browser import chromium
+from helpers_browser import chromium, served
 from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("pyarrow")
@@ -149,16 +148,6 @@ def opened(window: Any, address: str, width: int = 390) -> Iterator[Any]:
         page.goto(address)
         yield page
     assert not wrong
-
-
-@contextmanager
-def served(folder: Path) -> Iterator[str]:
-    with serving.server(folder) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        try:
-            yield f"http://127.0.0.1:{server.server_port}/"
-        finally:
-            server.shutdown()
 
 
 @pytest.fixture

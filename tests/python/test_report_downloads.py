@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import _registry, collections
-from fclib.cli import app
 from fclib.report import build_site, citing
 from fclib.report.recipes import recipes
+from helpers_cli import invoke
 from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("mujoco")
@@ -24,10 +23,6 @@ pytest.importorskip("pyarrow")
 skip_without_libraries()
 NAME = "standard/Walker"  # of a set that is a list
 read: Any = fclib.read
-
-
-def run(*words: object) -> Any:
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def numbers(folder: Path) -> list[int]:
@@ -42,33 +37,33 @@ def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = collections.plan_of(NAME)
     assert plan.chosen is not None
     names = [f"{NAME}/{number:04d}" for number in plan.chosen[:2]]
-    done = run("collection", "build", names[0], "--out", folder, "--no-pictures", "-j", "1")
+    done = invoke("collection", "build", names[0], "--out", folder, "--no-pictures", "-j", "1")
     if "No such option" in done.output:
-        done = run("collection", "build", names[0], "--out", folder, "--no-pictures")
+        done = invoke("collection", "build", names[0], "--out", folder, "--no-pictures")
     assert done.exit_code == 0, done.output
     assert numbers(folder) == [plan.chosen[0]]
     # another one comes to it, and the first one stays; a list says the same
     listed = folder.parent / "selection.txt"
     listed.write_text(f"# mine\n{names[1]}\n\n")
-    done = run("collection", "build", "--list", listed, "--out", folder, "--no-pictures")
+    done = invoke("collection", "build", "--list", listed, "--out", folder, "--no-pictures")
     assert done.exit_code == 0, done.output
     assert numbers(folder) == list(plan.chosen[:2])
     # what is there is left as it is
     path = folder / NAME / "catalog.parquet"
     before = path.stat().st_mtime_ns
-    assert run("collection", "build", names[0], "--out", folder, "--no-pictures").exit_code == 0
+    assert invoke("collection", "build", names[0], "--out", folder, "--no-pictures").exit_code == 0
     assert path.stat().st_mtime_ns == before
     return folder
 
 
 def test_a_name_that_is_none_is_said(tmp_path: Path) -> None:
-    done = run("collection", "build", f"{NAME}/9999", "--out", tmp_path)
+    done = invoke("collection", "build", f"{NAME}/9999", "--out", tmp_path)
     assert done.exit_code == 2
     assert "has no problem 9999" in done.output
-    assert run("collection", "build", "standard/7", "--out", tmp_path).exit_code == 2
+    assert invoke("collection", "build", "standard/7", "--out", tmp_path).exit_code == 2
     empty = tmp_path / "empty.txt"
     empty.write_text("# nothing\n")
-    done = run("collection", "build", "--list", empty, "--out", tmp_path)
+    done = invoke("collection", "build", "--list", empty, "--out", tmp_path)
     assert done.exit_code == 1
     assert "names nothing" in done.output
 
@@ -123,7 +118,7 @@ def test_lines_of_the_page_work_as_they_stand(
     assert values["result"].status == "converged"
     for line in own["shell"].splitlines()[:1]:
         words = line.replace("{path}", "problem.hdf5").split()[1:]
-        assert run(*words).exit_code == 0
+        assert invoke(*words).exit_code == 0
     library = next(iter(Path(os.environ.get("FCLIB_BUILD", "none")).rglob("libfclib.so")), None)
     compiler = shutil.which("cc")
     if library is None or compiler is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 import random
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,11 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import helpers_cli
 from fclib.bench import Job, Limits, ProblemFacts, Record, SolverChoice, Store, comparison, profiles
 from fclib.report import Campaigns, build_site
 from fclib.report.view import rounded
+from helpers_bench import facts_of
 from helpers_browser import chromium
+from helpers_cli import tables
 from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("pyarrow")
@@ -33,19 +33,15 @@ DIGITS = 6
 
 def facts(family: str, number: int, form: str) -> ProblemFacts:
     """A problem of a family; the two forms of one lie beside each other."""
-    return ProblemFacts(
-        hash=f"{family}{number}{form}".ljust(64, "0"),
-        name=f"{number:04d}-{form}",  # the same in several families
+    return facts_of(
+        f"{family}{number}{form}".ljust(64, "0"),
+        f"{number:04d}-{form}",  # the same in several families
         family=family,
         path=f"/there/set/{family}/{number:04d}-{form}.hdf5",
         kind=form,
         formulation="G3DFC" if form == "global" else "3DFC",
-        spacedim=3,
         n=6 if form == "global" else 0,
-        p=0,
         nc=3 * number,
-        nnz=9,
-        title="",
     )
 
 
@@ -106,17 +102,6 @@ def page(site: Path) -> Iterator[Any]:
         opened.goto((site / "index.html").as_uri() + "#/overview")
         opened.wait_for_selector("main h1")
         yield opened
-
-
-def tables(store: Path, *arguments: str) -> dict[str, list[dict[str, Any]]]:
-    """The tables of `fclib profile`, by their names."""
-    done = helpers_cli.run("profile", str(store), "--json", *arguments)
-    assert done.returncode == 0, done.stderr
-    found: dict[str, list[dict[str, Any]]] = {}
-    for line in done.stdout.splitlines():
-        record = json.loads(line)
-        found.setdefault(record.pop("table"), []).append(record)
-    return found
 
 
 def test_overview_says_what_the_command_says(store: Path, site: Path) -> None:

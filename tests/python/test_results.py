@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import json
 import re
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-from helpers import git
+from helpers import git, script
 from workshop.tables import _results
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def module(path: str) -> ModuleType:
-    """A script, as a module."""
-    spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
-    return found
 
 
 def script_of(command: str) -> Path:
@@ -35,7 +23,7 @@ def script_of(command: str) -> Path:
     return ROOT / f"{name.replace('.', '/')}.py"
 
 
-results = module("scripts/site/results.py")
+results = script("scripts/site/results.py")
 
 FOLDER = ROOT / "docs" / "results"
 TABLES = sorted(FOLDER.glob("*.csv"))

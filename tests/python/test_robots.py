@@ -11,6 +11,7 @@ from fclib import scenes
 pytest.importorskip("mujoco")
 
 from fclib.simulate import MujocoModel, Step, simulate
+from helpers_simulate import force_on, mujoco_of
 
 LIFTED = 0.645  # share of the gripper's cycle in which it holds the row up
 FALLEN = 1e-3  # [m]
@@ -24,25 +25,6 @@ def heights(step: Step, blocks: int) -> Any:
 def penetration(step: Step) -> float:
     """The deepest at the start of a step [m]."""
     return float(np.max(-step.contacts.gap, initial=0.0))
-
-
-def mujoco_of(step: Step) -> Any:
-    """MuJoCo's model behind a step."""
-    assert isinstance(step.model, MujocoModel)
-    return step.model.model
-
-
-def force_on(step: Step, body: str, by: str | None = None) -> Any:
-    """(3) what the contacts, those with one other body or all, press a body with [N]."""
-    model = mujoco_of(step)
-    bodies = model.geom_bodyid[step.contacts.pair]
-    own = bodies == model.body(body).id
-    sign = own[:, 1].astype(float) - own[:, 0]
-    if by is not None:
-        sign[~(bodies == model.body(by).id).any(axis=1)] = 0.0
-    impulses = np.reshape(step.result.solution.r, (-1, 3))
-    turned = np.einsum("ci,cij->cj", impulses, step.contacts.frame)
-    return sign @ turned / model.opt.timestep
 
 
 # ---- the gripper
@@ -136,17 +118,3 @@ def test_the_blade_lets_no_block_through() -> None:
     inside = np.abs(last[:, 1]) < 0.5 * family.blade - family.edge
     assert inside.any()
     assert (last[inside, 0] > blade).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("Gripper", {"blocks": 0}),
-        ("Gripper", {"mu": 0.0}),
-        ("Pusher", {"across": 0}),
-        ("Pusher", {"edge": -1.0}),
-    ],
-)
-def test_robots_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        scenes.get(name)(**wrong)

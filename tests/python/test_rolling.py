@@ -12,27 +12,11 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import dense
+from helpers import as_global, dense
 from helpers import planted_rolling as planted
 
 Array = npt.NDArray[np.float64]
 CASES = [(d, seed) for d in (3, 5) for seed in range(6)]
-
-
-def as_global(problem: fclib.LocalRollingProblem) -> fclib.GlobalRollingProblem:
-    """The same contacts on bodies: H = I, M = W^-1."""
-    W = np.asarray(problem.W)
-    mass = np.linalg.inv(W)
-    mass = 0.5 * (mass + mass.T)
-    return fclib.GlobalRollingProblem(
-        spacedim=problem.spacedim,
-        M=mass,
-        H=np.eye(problem.m),
-        f=mass @ problem.q,
-        w=np.zeros(problem.m),
-        mu=problem.mu,
-        mu_r=problem.mu_r,
-    )
 
 
 @pytest.mark.parametrize(("d", "seed"), CASES)
@@ -80,9 +64,8 @@ def test_files_keep_every_number(d: int, seed: int, tmp_path: Path) -> None:
     path = tmp_path / "rolling.hdf5"
     for problem in (local, as_global(local)):
         fclib.write(path, problem, fclib.Solution(r=r))
-        back = fclib.read(path)
+        back: Any = fclib.read(path)
         assert type(back) is type(problem)
-        assert isinstance(back, (fclib.LocalRollingProblem, fclib.GlobalRollingProblem))
         np.testing.assert_array_equal(back.mu_r, problem.mu_r)
         assert back.spacedim == d
         solution = fclib.read_solution(path)
@@ -121,7 +104,7 @@ def test_what_is_wrong_is_named() -> None:
             fclib.LocalRollingProblem(**(good | wrong)).validate()
 
 
-def test_real_rolling_problems_read_and_solve(real_data: Path) -> None:
+def test_real_rolling_problems_have_the_sizes_of_the_index(real_data: Path) -> None:
     with (real_data / "INDEX.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["kind"].startswith("rolling")]
     assert len(rows) == 5
@@ -129,5 +112,3 @@ def test_real_rolling_problems_read_and_solve(real_data: Path) -> None:
         problem = fclib.read(real_data / row["kind"] / f"{row['name']}.hdf5")
         assert problem.spacedim == int(row["spacedim"])
         assert (problem.nc, problem.m) == (int(row["nc"]), int(row["m"]))
-        result = fclib.solve(problem, tol=1e-8)
-        assert result.converged, row["name"]

@@ -14,11 +14,7 @@ from fclib.analysis import enumerate_solutions
 pytest.importorskip("mujoco")
 
 from fclib.simulate import Step, simulate
-
-
-def last_of(scene: scenes.Scene, steps: int) -> Step:
-    *_, last = simulate(scene, steps)
-    return last
+from helpers_simulate import last_of
 
 
 def energies(steps: list[Step]) -> Any:

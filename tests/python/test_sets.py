@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import scenes
-from fclib.cli import app
 
 pytest.importorskip("pyarrow")
 
@@ -22,14 +20,11 @@ from fclib import collections
 from fclib.collections import catalog, set_index
 from fclib.collections.plan import Plan
 from fclib.scenes.local_problems import LocalProblems
+from helpers_cli import invoke
 from workshop.sets import choose
 
 TINY = set_index.DATA / "tiny"
 FILES = sorted(TINY.glob("*/*.hdf5"))
-
-
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 # ---- sets

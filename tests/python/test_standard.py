@@ -8,27 +8,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import _solve, _stored, scenes
 from fclib.analysis import analyze, check, read_certificate
-from fclib.cli import app
 
 pytest.importorskip("pyarrow")
 
 from fclib import collections
 from fclib.collections import published, ratings, set_index, trajectory
+from helpers_cli import invoke
 from workshop.sets import choose, features
 
 load: Any = fclib.load
 there = pytest.mark.skipif(
     published.root() is None, reason="the package of trajectories is not here"
 )
-
-
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 # ---- features

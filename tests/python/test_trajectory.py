@@ -14,11 +14,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import _digest, scenes
-from fclib.cli import app
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -27,6 +25,7 @@ from fclib import collections, simulate
 from fclib.collections import published, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation
 from fclib.collections.record import record
+from helpers_cli import invoke
 from workshop.sets import collection_table
 
 read: Any = fclib.read
@@ -47,10 +46,6 @@ def recorded(folder: Path, version: str = "7", **settings: Any) -> Path:
     target = folder / collections.file_name(FOLDER, version)
     record(plan, target, folder / "state.npz")
     return target
-
-
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def digests(folder: Path) -> dict[str, str]:

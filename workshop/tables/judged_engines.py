@@ -25,6 +25,7 @@ from typing import Any
 
 import fclib
 from fclib import recorders
+from fclib.report.judged import shown, write_judged
 from workshop.tables import _results
 
 H = 2e-3  # [s]
@@ -363,8 +364,6 @@ def main() -> None:
             table.append({key: shown(value) for key, value in row.items()})
             print("  ".join(table[-1].values()), flush=True)
         if arguments.pages and runs:
-            from fclib.report.judged import write_judged
-
             write_judged(runs, arguments.pages / f"{scene}.html")
     if not table:
         sys.exit("no engine is installed: pip install 'fclib[recorders]'")
@@ -377,11 +376,6 @@ def main() -> None:
             command="PYTHON -m workshop.tables.judged_engines --results judged-engines",
         )
         print(path)
-
-
-def shown(value: Any) -> str:
-    """A cell of the table."""
-    return f"{value:.2g}" if isinstance(value, float) else str(value)
 
 
 if __name__ == "__main__":

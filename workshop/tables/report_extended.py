@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import shutil
 import tempfile
-import time
 from collections import defaultdict
 from pathlib import Path
 from statistics import mean
@@ -25,10 +24,10 @@ from fclib.collections import catalog, families, read_catalog, sets
 from fclib.report import build_site
 from fclib.report.view import as_json
 from workshop.tables import _results
-from workshop.tables.report_size import ANSWER, busy
+from workshop.tables.report_size import CATALOGUE, REPEATS, open_pages
 
-REPEATS = 5  # times that each page is opened
-FILTER = "masonry contacts > 50 class = hard"
+MARKS = {name: (f"#/{name}", "main h1") for name in ("overview", CATALOGUE)}
+FILTERS = ("masonry contacts > 50 class = hard", "masonry contacts > 50 class = hard arch")
 
 
 def sizes(site: Path, rows: list[dict[str, Any]]) -> dict[str, float]:
@@ -49,45 +48,6 @@ def many(rows: list[dict[str, Any]], count: int) -> list[dict[str, Any]]:
         name = f"extended/{row['family']}/{k:05d}"
         found.append({**row, **nothing, "id": name, "number": k, "local_file": f"{name}.hdf5"})
     return found
-
-
-def opened(site: Path) -> dict[str, tuple[float, float]]:
-    """Seconds, and of CPU, until a page is there or the filter has answered; the least of all."""
-    from playwright.sync_api import sync_playwright
-
-    found: dict[str, list[tuple[float, float]]] = defaultdict(list)
-
-    def note(name: str, tools: Any, act: Any) -> None:
-        before = busy(tools)
-        start = time.perf_counter()
-        act()
-        seconds = time.perf_counter() - start
-        found[name].append((seconds, busy(tools) - before))
-
-    with sync_playwright() as playwright:
-        chromium = shutil.which("chromium-headless-shell") or shutil.which("chromium")
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for _ in range(REPEATS):
-            for name in ("overview", "catalogue"):
-                page = browser.new_page()
-                tools = page.context.new_cdp_session(page)
-                tools.send("Performance.enable", {"timeDomain": "threadTicks"})
-                address = f"{(site / 'index.html').as_uri()}#/{name}"
-
-                def open_page(page: Any = page, address: str = address) -> None:
-                    page.goto(address)
-                    page.wait_for_selector("main h1")
-
-                note(name, tools, open_page)
-                page.wait_for_timeout(1000)  # nobody types before
-                for text in (FILTER, f"{FILTER} arch") if name == "catalogue" else ():
-                    note("filter", tools, lambda page=page, text=text: page.evaluate(ANSWER, text))
-                page.close()
-        browser.close()
-    return {
-        name: (min(own[0] for own in all_), min(own[1] for own in all_))
-        for name, all_ in found.items()
-    }
 
 
 def main() -> None:
@@ -129,7 +89,7 @@ def main() -> None:
         (site / "data" / "catalogue.js").write_text(with_pictures(site, total), encoding="utf-8")
         pages = [
             {"what": name, "CPU [s]": cpu, "clock [s]": seconds}
-            for name, (seconds, cpu) in opened(site).items()
+            for name, (seconds, cpu) in open_pages(site, MARKS, "filter", FILTERS).items()
         ]
     print(_results.table(list(pages[0]), pages))
     if options.results:

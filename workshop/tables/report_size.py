@@ -18,7 +18,7 @@ import shutil
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,14 @@ from workshop.tables import _results
 PARTS = {"overview": ("site", "catalogue"), "catalogue": ("site", "catalogue")}
 REPEATS = 5  # times that each page is opened
 CATALOGUE = "catalogue"
+MARKS = {
+    "overview, which solver to take": ("#/overview", "main .answer a"),
+    "overview, its first profile": ("#/overview", "main .plot[data-shown]"),
+    CATALOGUE: ("#/catalogue", "main table tbody tr"),
+    "a problem": ("#/problem/Family1/00001", "main table tbody tr"),
+    "profiles, their table of statuses": ("#/profiles", "main table tbody tr"),
+    "profiles, their curves": ("#/profiles", "main .plot[data-shown]"),
+}
 FILTERS = ("contacts > 500", "contacts > 500 and solver-07")
 # types into the filter of a catalogue, and waits for what it says
 ANSWER = """async (text) => {
@@ -93,18 +101,19 @@ def size(site: Path, *names: str) -> float:
     return sum((site / "data" / f"{name}.js").stat().st_size for name in names) / 1e6
 
 
-def open_pages(site: Path) -> dict[str, tuple[float, float]]:
-    """Seconds, and of CPU, until each page shows what it is about; the least of all."""
+def open_pages(
+    site: Path, marks: Mapping[str, tuple[str, str]], answer: str, filters: Sequence[str]
+) -> dict[str, tuple[float, float]]:
+    """Seconds, and of CPU, until each page shows what it is about; the least of all.
+
+    Args:
+        site: the site.
+        marks: by name the address of a page, and the selector of what it is about.
+        answer: the name of an answer of the filter of the page CATALOGUE.
+        filters: what is typed into the filter.
+    """
     from playwright.sync_api import sync_playwright
 
-    marks = {
-        "overview, which solver to take": ("#/overview", "main .answer a"),
-        "overview, its first profile": ("#/overview", "main .plot[data-shown]"),
-        CATALOGUE: ("#/catalogue", "main table tbody tr"),
-        "a problem": ("#/problem/Family1/00001", "main table tbody tr"),
-        "profiles, their table of statuses": ("#/profiles", "main table tbody tr"),
-        "profiles, their curves": ("#/profiles", "main .plot[data-shown]"),
-    }
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
     def note(name: str, tools: Any, act: Callable[[], object]) -> None:
@@ -128,12 +137,12 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
 
                 note(name, tools, show)
                 page.wait_for_timeout(1000)  # nobody types before
-                for text in FILTERS if name == CATALOGUE else ():
+                for text in filters if name == CATALOGUE else ():
 
                     def ask(page: Any = page, text: str = text) -> None:
                         page.evaluate(ANSWER, text)
 
-                    note("catalogue, an answer of its filter", tools, ask)
+                    note(answer, tools, ask)
                 page.close()
         browser.close()
     return {name: (min(t for t, _ in own), min(c for _, c in own)) for name, own in found.items()}
@@ -171,7 +180,7 @@ def main() -> None:
         }
         print(_results.table(list(built), [built]))
         try:
-            opened = open_pages(site)
+            opened = open_pages(site, MARKS, "catalogue, an answer of its filter", FILTERS)
         except ImportError:
             parser.exit(1, "the times to open need Playwright\n")
     pages = [

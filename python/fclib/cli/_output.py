@@ -343,17 +343,9 @@ class Report:
         raise typer.Exit(int(self.failed))
 
 
-def steps_of(file: Path) -> list[Path]:
-    """The steps of a sequence, or the file itself."""
-    try:
-        return _sequence.expanded(file)
-    except fclib.Error:
-        return [file]  # reading it will report the fault
-
-
 def each_file(files: Iterable[Path], what: str) -> Iterator[Path]:
     """Go through the files, and the steps of sequences, with progress."""
-    paths = [path for file in files for path in steps_of(file)]
+    paths = [path for file in files for path in _sequence.steps_or_file(file)]
     with progress_bar(len(paths)) as show:
         for path in paths:
             show(f"{what} {path.name}")

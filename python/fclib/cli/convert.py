@@ -14,7 +14,7 @@ import typer
 import fclib
 from fclib import _laws, _sequence
 from fclib.cli._files import contents_of
-from fclib.cli._output import Json, Report, each_file, err, steps_of, usage_error
+from fclib.cli._output import Json, Report, each_file, err, usage_error
 
 
 class Format(str, Enum):
@@ -208,7 +208,7 @@ def targets_of(
     """
     if out_dir is not None:
         output = output or Format.hdf5
-        files = [path for file in files for path in steps_of(file)]
+        files = [path for file in files for path in _sequence.steps_or_file(file)]
         targets = [out_dir / (_sequence.name_of(path) + EXTENSION_OF[output]) for path in files]
         for target in targets:
             if targets.count(target) > 1:
@@ -217,7 +217,7 @@ def targets_of(
     if len(files) != 2:
         raise ValueError("give an input and an output, or inputs and --out FOLDER")
     source, target = files
-    if (steps := steps_of(source)) != [source]:
+    if (steps := _sequence.steps_or_file(source)) != [source]:
         raise ValueError(
             f"{source} is a sequence of {len(steps)} steps: name one of them, as {source}#0, or a"
             " folder for all by --out"

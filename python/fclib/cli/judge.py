@@ -14,8 +14,8 @@ from typing import Annotated, Any
 import typer
 
 import fclib
-from fclib._sequence import SUFFIXES
-from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, steps_of, usage_error
+from fclib._sequence import SUFFIXES, steps_or_file
+from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error
 
 
 def command(
@@ -107,7 +107,9 @@ def judged(folders: dict[str, Path], every: int) -> dict[str, Sequence[Any]]:
             known = ", ".join(recorders.ENGINES)
             fail(f"{name!r}: is neither a folder, a file nor an engine; there is: {known}")
         found = sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES)
-        files = [step for one in found or [folder] if not one.is_dir() for step in steps_of(one)]
+        files = [
+            step for one in found or [folder] if not one.is_dir() for step in steps_or_file(one)
+        ]
         files = files[::every]
         if not files:
             fail(f"{name}: there is no step with contacts")

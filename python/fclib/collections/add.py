@@ -89,7 +89,7 @@ def add(
         if path.suffix in SUFFIXES and path.is_file() and out not in path.parents:
             inner = path.parent.relative_to(source).parts
             family = plain("-".join(inner) or source.name)
-            families.setdefault(family, []).extend(_steps_of(path))
+            families.setdefault(family, []).extend(_sequence.steps_or_file(path))
     if not families:
         raise FileNotFoundError(f"{source}: holds no file *{' and no *'.join(SUFFIXES)}")
     report = progress or (lambda family, done, total: None)
@@ -101,13 +101,6 @@ def add(
             report(f"{collection}/{family}", done, len(paths))
         catalog.gather(out)
     return refused
-
-
-def _steps_of(path: Path) -> list[Path]:
-    try:
-        return _sequence.expanded(path)
-    except _core.Error:
-        return [path]  # taking it in will report the fault
 
 
 def _sha256(path: Path) -> str:

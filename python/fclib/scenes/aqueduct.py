@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Aqueduct:
+class Aqueduct(Published):
     """Tiers of semicircular arcades upon each other, between two walls of rock.
 
     Rings, backing, spandrels, piers and decks are rigid stones; every joint has four contacts, so
@@ -32,10 +32,8 @@ class Aqueduct:
     )
     application: ClassVar[str] = "masonry"
     authors: ClassVar[str] = "V. Acary, M. Bremond, O. Huber; LMGC90 development team"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 60
-    allowance: ClassVar[bool] = False  # its published states have none
     # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"spans": 2, "tiers": 1}
 
@@ -133,19 +131,13 @@ class Aqueduct:
                 1.1 * back,
                 speed=self.settlement if sinks else 0.0,
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Aqueduct",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.radius,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=self.radius,
+            rest=[*built.rest, *built.keyframe()],
             focus=(0.0, 0.0, 0.5 * bottom, 0.45 * bottom),
         )
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Arch:
+class Arch(Published):
     """Equal voussoirs laid to a circular arch on two abutments; the right one moves away.
 
     Every joint has four contacts, one in each corner. Three are enough to hold a stone, so the
@@ -27,11 +27,8 @@ class Arch:
         "Voussoirs without mortar between two abutments that move apart, under gravity."
     )
     application: ClassVar[str] = "masonry"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     voussoirs: int = parameter(24, "1", "number of voussoirs, at least 2")
     radius: float = parameter(2.0, "m", "radius of the middle line")
@@ -92,17 +89,11 @@ class Arch:
         built.support(
             "right", [right], front - more, back + more, axis=(1, 0, 0), speed=self.spread
         )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Arch",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.radius,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=0.5 * self.radius,
+            rest=[*built.rest, *built.keyframe()],
         )

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class BouncingPile:
+class BouncingPile(Published):
     """Equal spheres that fall into an open box and bounce, by Newton's law of impact.
 
     The right-hand side has e u_N^- at each contact, which is 0 in families with e = 0. Newton's law
@@ -23,11 +23,8 @@ class BouncingPile:
     title: ClassVar[str] = "Bouncing pile"
     description: ClassVar[str] = "Spheres that fall into a box and bounce, with restitution."
     application: ClassVar[str] = "impacts"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 200
-    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(100, "1", "number of spheres, at least 1")
     across: int = parameter(4, "1", "spheres of a layer along x and along y, at least 1")
@@ -64,15 +61,4 @@ class BouncingPile:
             place[2] += self.radius + self.height
             place += self.radius * draw
             bodies.append(mjcf.sphere(i, self.spheres, place, self.radius, self.density, friction))
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "BouncingPile",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius)

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoxesStack:
+class BoxesStack(Published):
     """A column of equal cubes, a small gap below each, that falls on the floor and comes to rest.
 
     A tall stack is hard for a first-order method: a reaction at the bottom carries the weight of
@@ -31,10 +31,8 @@ class BoxesStack:
     )
     application: ClassVar[str] = "multibody systems, masonry"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1514
-    allowance: ClassVar[bool] = False  # its published states have none
 
     boxes: int = parameter(50, "1", "number of boxes, at least 1")
     size: float = parameter(2.0, "m", "edge of a box")
@@ -72,16 +70,10 @@ class BoxesStack:
                 f'<geom type="mesh" mesh="box" mass="{self.mass!r}" friction="{self.mu!r}"'
                 f' condim="3" material="solid" rgba="{mjcf.shade(i, self.boxes)}"/></body>'
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "BoxesStack",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("box", self.size, self.size, self.size)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.size,
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("box", self.size, self.size, self.size)],
+            tile=self.size,
         )

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bridge:
+class Bridge(Published):
     """A segmental arch with backing, spandrels and deck; the right abutment gives way.
 
     Held between two abutments that stay, the masonry jams and carries almost anything. As they
@@ -33,7 +33,6 @@ class Bridge:
     friction: ClassVar[str] = "Coulomb, the same coefficient between stones; wheels without"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     voussoirs: int = parameter(9, "1", "number of voussoirs, at least 3")
     slabs: int = parameter(6, "1", "number of slabs of the deck, at least 1")
@@ -113,19 +112,13 @@ class Bridge:
         built.support("right", right, front, back, axis=(1, 0, 0), speed=self.spread)
         velocity += [0.0] * len(built.speeds)
         reach = arcade.end + 0.5 * approach
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Bridge",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.radius,
-                rest=[*built.rest, *built.keyframe(velocity)],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=0.5 * self.radius,
+            rest=[*built.rest, *built.keyframe(velocity)],
             focus=(0.0, 0.0, 0.5 * arcade.top, 0.5 * reach),
         )
 

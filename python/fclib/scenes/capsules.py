@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Capsules:
+class Capsules(Published):
     """Equal capsules, layer above layer, that fall into an open box.
 
     They start on a grid wide enough that they do not touch, in random directions near the
@@ -30,10 +30,8 @@ class Capsules:
     description: ClassVar[str] = "Equal capsules dropped into an open box, under gravity."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1705
-    allowance: ClassVar[bool] = False  # its published states have none
 
     capsules: int = parameter(100, "1", "number of capsules, at least 1")
     length: float = parameter(5.0, "m", "length of a capsule, caps included")
@@ -97,18 +95,12 @@ class Capsules:
                 f' rgba="{mjcf.shade(i, self.capsules)}"/></body>'
             )
         bodies += mjcf.walls(0.5 * self.width, self.width, self.mu)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Capsules",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-                velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            tile=0.25 * self.width,
+            velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
+            rest=mjcf.margins(self.margin),
             law="gap" if self.gaps else "velocity",
         )

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
@@ -18,7 +18,7 @@ OVERLAP: Final = 1e-6  # [m], at the start: the law on velocities keeps such joi
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain:
+class Chain(Published):
     """Links that hang one in another, the first one held, the lower end set in motion.
 
     A link is a loop of straight rods, all links alike: two sides, and two ends that follow a half
@@ -40,10 +40,8 @@ class Chain:
     )
     application: ClassVar[str] = "multibody systems"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1514
-    allowance: ClassVar[bool] = False  # its published states have none
 
     links: int = parameter(11, "1", "number of links, the held one among them, at least 2")
     length: float = parameter(13.7, "m", "length of the chain")
@@ -118,19 +116,13 @@ class Chain:
                 z += self._height(pitch, along, across)
                 if i >= self.links - 1 - self.loose:
                     z += gaps[i]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Chain",
-                bodies=links,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-self.length,
-                tile=0.1 * self.length,
-                velocity=velocities,
-            ),
+            bodies=links,
+            floor_z=-self.length,
+            tile=0.1 * self.length,
+            velocity=velocities,
             # a link in the middle with its two joints: the whole chain would be a hair
             focus=(0.0, 0.0, -(self.links // 2) * pitch, 0.3 * pitch),
             view=(125.0, -60.0),

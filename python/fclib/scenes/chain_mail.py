@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChainMail:
+class ChainMail(Published):
     """Flat rings in rows and columns, each two neighbours joined by an upright ring; a ball on it.
 
     The outer rings are fast. A ball falls onto the net, which sags until its rings are taut.
@@ -27,11 +27,8 @@ class ChainMail:
     title: ClassVar[str] = "Net of rings"
     description: ClassVar[str] = "Chain mail held at its edge, and a ball that falls into it."
     application: ClassVar[str] = "multibody systems"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # its published states have none
 
     across: int = parameter(6, "1", "flat rings of a row and of a column, the fast ones too, >= 3")
     spacing: float = parameter(0.05, "m", "from a flat ring to the next one")
@@ -96,18 +93,12 @@ class ChainMail:
                 mjcf.grain("ball", (*shift, high), shape, mjcf.surface(self.mu), "0.62 0.3 0.2 1")
             )
         low = -self.spacing * self.across
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ChainMail",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=low,
-                tile=self.spacing,
-            ),
+            bodies=bodies,
+            floor_z=low,
+            tile=self.spacing,
             law="gap",
             focus=(0.0, 0.0, 0.0, 0.65 * self.spacing * self.across),
         )

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chute:
+class Chute(Published):
     """Grains that start as a bed on a steep slope, slide down between two walls, and pile up below.
 
     A grain is a sphere or a polyhedron with eight corners. Those that slide together are in loose
@@ -32,10 +32,8 @@ class Chute:
     description: ClassVar[str] = "Polyhedra and spheres that flow down a chute and pile up below."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary, S. Sinclair"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # its published states have none
 
     grains: int = parameter(240, "1", "number of grains, at least 1")
     spheres: float = parameter(0.25, "1", "share of the grains that are spheres, in [0, 1]")
@@ -126,19 +124,13 @@ class Chute:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                assets=[mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * pitch,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            assets=[mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
+            tile=2 * pitch,
+            rest=mjcf.margins(self.margin),
             law="gap" if self.gaps else "velocity",
         )
 

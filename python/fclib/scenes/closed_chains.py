@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClosedChains:
+class ClosedChains(Published):
     """Chains of rods with ball joints, each closed into a loop, dropped over a bar one by one.
 
     A loop is a tree of joints in minimal coordinates, closed by a bilateral constraint of three
@@ -28,11 +28,8 @@ class ClosedChains:
         "Chains of rods closed into loops, falling over a bar, on each other and on a floor."
     )
     application: ClassVar[str] = "mechanisms, multibody systems"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     chains: int = parameter(5, "1", "number of chains, at least 1")
     links: int = parameter(10, "1", "rods of a chain, at least 3")
@@ -93,18 +90,12 @@ class ClosedChains:
                 f' anchor="{mjcf.numbers(self.length, 0, 0)}"/></equality>',
                 f'<contact><exclude body1="link{i}.{last}" body2="link{i}.0"/></contact>',
             ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ClosedChains",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                rest=rest,
-            ),
+            bodies=bodies,
+            tile=self.length,
+            rest=rest,
             # ends of rods are fast: nothing is to be passed through
             law="velocity" if self.restitution else "gap",
         )

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 from fclib.scenes.shared.solids import Bed, Block, Load, Solids
 
 
 @dataclass(frozen=True, kw_only=True)
-class CubesH8:
+class CubesH8(Published):
     """An elastic cube on another, which is held on a stiff layer.
 
     The upper one falls a short way, is pressed down, and then pushed from the side until it slides.
@@ -32,10 +32,8 @@ class CubesH8:
     )
     application: ClassVar[str] = "deformable solids"
     authors: ClassVar[str] = "V. Acary; original simulation by the developers of LMGC90"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
     problems: ClassVar[int] = 40
-    allowance: ClassVar[bool] = False  # its published states have none
 
     elements: int = parameter(5, "1", "elements along an edge of a cube, at least 1")
     size: float = parameter(1.0, "m", "edge of the lower cube")

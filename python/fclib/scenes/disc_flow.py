@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscFlow:
+class DiscFlow(Published):
     """Discs of a few sizes that begin on a grid above a ramp, flow down, and pile up before a wall.
 
     Bodies move in a vertical plane (n = 3 for each), and a contact has two components, N and T.
@@ -22,11 +22,9 @@ class DiscFlow:
     title: ClassVar[str] = "Flow of discs on a wall"
     description: ClassVar[str] = "Discs in a vertical plane that flow down a ramp against a wall."
     application: ClassVar[str] = "granular matter"
-    authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb in the plane, the same coefficient everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     discs: int = parameter(150, "1", "number of discs, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a disc")
@@ -80,16 +78,10 @@ class DiscFlow:
             )
         end = 0.5 * width
         walls = [((-1.2 * width, 1.2 * rise * width), (0.0, 0.0)), ((end, 0.0), (end, 1.5 * end))]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "DiscFlow",
-                bodies=[*bodies, *mjcf.lines(walls, f'friction="{self.mu!r}"')],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
+            bodies=[*bodies, *mjcf.lines(walls, f'friction="{self.mu!r}"')],
+            tile=4 * self.radius,
             planar=True,
         )

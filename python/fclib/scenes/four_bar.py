@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Pair = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FourBar:
+class FourBar(Published):
     """Four-bar linkages in a row, driven by their cranks, each before a stack of blocks.
 
     Crank and rocker turn on a frame; the coupler hangs on the crank, and a bilateral constraint
@@ -29,11 +29,8 @@ class FourBar:
         "Driven four-bar linkages, closed loops, whose legs kick stacks of blocks over a floor."
     )
     application: ClassVar[str] = "mechanisms, robotics"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     linkages: int = parameter(3, "1", "number of linkages, at least 1")
     blocks: int = parameter(3, "1", "blocks of the stack before a linkage, at least 1")
@@ -94,27 +91,21 @@ class FourBar:
             )
             motors.append(f'<velocity joint="crank{i}" kv="{self.gain!r}"/>')
         controls = mjcf.numbers(*[self.speed] * self.linkages)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "FourBar",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.block,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    "<actuator>",
-                    *motors,
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
+            tile=4 * self.block,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                "<actuator>",
+                *motors,
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

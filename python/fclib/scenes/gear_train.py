@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 PRESSURE = math.radians(20)  # angle of the standard rack
 FLANK = 6  # points of an involute
@@ -18,7 +18,7 @@ IRON = "0.45 0.47 0.5 1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearTrain:
+class GearTrain(Published):
     """Involute gears mesh in a row; each hangs on a fixed pin, with play in its bore.
 
     Why it is here: few degrees of freedom and many contacts. One to two pairs of teeth mesh at a
@@ -40,7 +40,6 @@ class GearTrain:
     friction: ClassVar[str] = "Coulomb, one coefficient for teeth and pins"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # its published states have none
 
     gears: int = parameter(5, "1", "number of gears, at least 2")
     teeth: int = parameter(18, "1", "teeth of the first gear, and of every second one, at least 12")
@@ -99,19 +98,13 @@ class GearTrain:
             ),
             "</keyframe>",
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "GearTrain",
-                bodies=bodies,
-                assets=[self._tooth(f"tooth{count}", count) for count in dict.fromkeys(counts)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=10 * self.module,
-                rest=drive,
-            ),
+            bodies=bodies,
+            assets=[self._tooth(f"tooth{count}", count) for count in dict.fromkeys(counts)],
+            tile=10 * self.module,
+            rest=drive,
             planar=True,
         )
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 JAW = (0.8, 0.15, 0.4)  # half edges of a jaw, along the row its thickness, in heights of a block
 CLEARANCE = 0.1  # of a jaw from the floor, in heights of a block
@@ -17,7 +17,7 @@ DAMPING = 2e3  # [N s/m] of it
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gripper:
+class Gripper(Published):
     """Two jaws press on the ends of a row of blocks and lift it; nothing is under the blocks.
 
     A row of k blocks of mass m hangs on the friction of the two jaws. At rest it holds as long as
@@ -35,11 +35,8 @@ class Gripper:
     title: ClassVar[str] = "Gripper lifting a row of blocks"
     description: ClassVar[str] = "A gripper closes on a row of blocks and lifts it by friction."
     application: ClassVar[str] = "robotics, grasping"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "robots"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # its published states have none
 
     blocks: int = parameter(5, "1", "blocks in the row, at least 1")
     height: float = parameter(0.08, "m", "height and width of a block")
@@ -103,27 +100,21 @@ class Gripper:
             f' ctrl="{mjcf.numbers(*squeeze, up * self.lift)}"/>'
             for i, (share, up) in enumerate(heights)
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Gripper",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.height,
-                rest=[
-                    "<actuator>",
-                    '<motor joint="left"/>',
-                    '<motor joint="right"/>',
-                    f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-            ),
+            bodies=bodies,
+            tile=2 * self.height,
+            rest=[
+                "<actuator>",
+                '<motor joint="left"/>',
+                '<motor joint="right"/>',
+                f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
         )
 
     def _hand(self, reach: float) -> str:

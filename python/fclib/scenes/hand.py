@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 STIFFNESS = 1e5  # [N/m] of the servo that holds the height
 DAMPING = 2e3  # [N s/m] of it
@@ -19,7 +19,7 @@ TIP = 0.3  # height of the tips above the floor, in heights of the object
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hand:
+class Hand(Published):
     """Fingers of two links reach down around a prism with as many sides, press on it and lift it.
 
     Torques drive the hinges, and no servo knows their angles: the object alone keeps the fingers in
@@ -40,10 +40,8 @@ class Hand:
     description: ClassVar[str] = "Fingers of two links close on a prism, lift it and set it down."
     application: ClassVar[str] = "robotics, grasping"
     authors: ClassVar[str] = "the authors of FCLIB, after J. K. Salisbury and B. Roth"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
-    allowance: ClassVar[bool] = False  # its published states have none
 
     fingers: int = parameter(6, "1", "number of fingers and of the object's sides, at least 3")
     size: float = parameter(0.04, "m", "from the object's axis to its sides")
@@ -119,29 +117,23 @@ class Hand:
             for k in range(self.fingers)
             for name in ("upper", "lower")
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Hand",
-                bodies=[thing, self._hand()],
-                assets=[mjcf.polyhedron_mesh("object", corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.size,
-                rest=[
-                    "<actuator>",
-                    *motors,
-                    f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-                # a capsule and a mesh touch in one point then
-                multiccd=False,
-            ),
+            bodies=[thing, self._hand()],
+            assets=[mjcf.polyhedron_mesh("object", corners)],
+            tile=2 * self.size,
+            rest=[
+                "<actuator>",
+                *motors,
+                f'<position joint="lift" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>',
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
+            # a capsule and a mesh touch in one point then
+            multiccd=False,
         )
 
     def _hand(self) -> str:

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Triple = tuple[float, float, float]
 
@@ -98,7 +98,7 @@ def holding(limb: Limb) -> Limb:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Humanoid:
+class Humanoid(Published):
     """A humanoid of 23 degrees of freedom, dropped on stones, held by springs in its joints.
 
     Feet touch the ground at their corners. The springs hold the joints near a crouch; with the
@@ -111,11 +111,9 @@ class Humanoid:
         "An articulated humanoid with springs and limits in its joints, dropped on uneven ground."
     )
     application: ClassVar[str] = "robotics, biomechanics"
-    authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere; limits without friction"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     height: float = parameter(1.7, "m", "height of the body")
     mass: float = parameter(70.0, "kg", "mass of the body, without the stones")
@@ -184,19 +182,7 @@ class Humanoid:
                     f"<contact><exclude {pair}/></contact>",
                 ]
         rest += self._drive(hips, places)
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.height,
-                rest=rest,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=0.25 * self.height, rest=rest)
 
     @property
     def _limbs_held(self) -> list[Limb]:

@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class KaplasTower:
+class KaplasTower(Published):
     """Rings of planks laid flat, each level turned by half a plank; a small gap below each level.
 
     The levels land one after the other, so that the problems grow from one ring on the floor to
@@ -33,10 +33,8 @@ class KaplasTower:
     )
     application: ClassVar[str] = "masonry, multibody systems"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 201
-    allowance: ClassVar[bool] = False  # its published states have none
 
     levels: int = parameter(12, "1", "number of rings, at least 1")
     planks: int = parameter(12, "1", "planks of a ring, at least 5")
@@ -83,16 +81,10 @@ class KaplasTower:
                     f' condim="3" material="solid"'
                     f' rgba="{mjcf.shade(2 * level + i % 2, 2 * self.levels)}"/></body>'
                 )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "KaplasTower",
-                bodies=bodies,
-                assets=[mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-            ),
+            bodies=bodies,
+            assets=[mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
+            tile=self.length,
         )

@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class LowWall:
+class LowWall(Published):
     """A wall two stones thick: courses of headers between courses of stretchers, laid dry.
 
     A stone rests on three or four others and touches its neighbours, each in four points: the
@@ -29,11 +29,8 @@ class LowWall:
         "A wall of rigid stones in English bond, without mortar, pushed over by a ram."
     )
     application: ClassVar[str] = "masonry"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 50
-    allowance: ClassVar[bool] = False  # its published states have none
 
     stretchers: int = parameter(3, "1", "length of the wall in stretchers and a half, at least 2")
     courses: int = parameter(5, "1", "number of courses, at least 1; the lowest is of headers")
@@ -83,19 +80,13 @@ class LowWall:
                 axis=(0, 1, 0),
                 speed=self.push,
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "LowWall",
-                bodies=built.bodies,
-                assets=built.assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                rest=[*built.rest, *built.keyframe()],
-            ),
+            bodies=built.bodies,
+            assets=built.assets,
+            tile=self.length,
+            rest=[*built.rest, *built.keyframe()],
             # from behind: the ram would hide the wall
             view=(-55.0, -14.0),
         )

@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 from fclib.scenes.shared.solids import Block, Load, Solids
 
 
 @dataclass(frozen=True, kw_only=True)
-class LowWallFEM:
+class LowWallFEM(Published):
     """Dry blocks in running bond on a rigid floor, each meshed coarsely.
 
     Its weight and a pressure on its top press the wall. A wave of further pressure passes along the
@@ -31,10 +31,8 @@ class LowWallFEM:
     )
     application: ClassVar[str] = "masonry, deformable solids"
     authors: ClassVar[str] = "V. Acary, F. Dubois; original simulation by the developers of LMGC90"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
     problems: ClassVar[int] = 50
-    allowance: ClassVar[bool] = False  # its published states have none
     # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"courses": 2, "length": 2}
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class NewtonsCradle:
+class NewtonsCradle(Published):
     """Equal balls on rods, each on a hinge of its own; the first ones swing into the others.
 
     With a gap between the balls impacts come one after the other, and with e = 1 as many balls
@@ -22,11 +22,8 @@ class NewtonsCradle:
     title: ClassVar[str] = "Newton cradle"
     description: ClassVar[str] = "Hanging balls in a row, struck by some of them; restitution 1."
     application: ClassVar[str] = "impacts"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 60
-    allowance: ClassVar[bool] = False  # its published states have none
 
     balls: int = parameter(7, "1", "number of balls, at least 2")
     struck: int = parameter(1, "1", "how many swing in, at least 1")
@@ -69,16 +66,4 @@ class NewtonsCradle:
             )
         # forwards is about -y
         swing = [-self.speed / self.length * (i < self.struck) for i in range(self.balls)]
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "NewtonsCradle",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                velocity=swing,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius, velocity=swing)

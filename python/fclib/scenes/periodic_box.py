@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PeriodicBox:
+class PeriodicBox(Published):
     """Random polyhedra that fall on a floor, in a square cell with periodic boundaries.
 
     What leaves on one side comes in on the other, so that the stack has no walls. A contact across
@@ -30,10 +30,8 @@ class PeriodicBox:
     )
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 220
-    allowance: ClassVar[bool] = False  # its published states have none
 
     polyhedra: int = parameter(100, "1", "number of polyhedra, at least 1")
     shapes: int = parameter(25, "1", "polyhedra that differ, at least 1")
@@ -103,19 +101,13 @@ class PeriodicBox:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "PeriodicBox",
-                bodies=bodies,
-                assets=[mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.125 * self.period,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            assets=[mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
+            tile=0.125 * self.period,
+            rest=mjcf.margins(self.margin),
             law="gap",
             period=(self.period, self.period),
             focus=(0.0, 0.0, 0.5 * self.period, 0.55 * self.period),

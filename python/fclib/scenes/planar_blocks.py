@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlanarBlocks:
+class PlanarBlocks(Published):
     """Blocks in running bond that settle, a small gap below each course, until a disc strikes them.
 
     Bodies move in a vertical plane (n = 3 for each), and two blocks touch in the two ends of what
@@ -22,11 +22,9 @@ class PlanarBlocks:
     title: ClassVar[str] = "Wall of blocks in the plane"
     description: ClassVar[str] = "Blocks in running bond in a vertical plane, struck by a disc."
     application: ClassVar[str] = "masonry"
-    authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb in the plane, the same coefficient everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 400
-    allowance: ClassVar[bool] = False  # its published states have none
 
     courses: int = parameter(10, "1", "number of courses, at least 1")
     blocks: int = parameter(5, "1", "blocks of a course, at least 1; a half more in every second")
@@ -94,21 +92,15 @@ class PlanarBlocks:
             # thrown so high that it comes down at the place of its start
             up = 0.5 * self.gravity * self.delay
             velocity = np.vstack((velocity, [self.disc_speed, up, 0.0]))
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "PlanarBlocks",
-                bodies=bodies,
-                assets=[
-                    mjcf.block_mesh("block", self.length, self.height, self.height),
-                    mjcf.block_mesh("half", half, self.height, self.height),
-                ],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.length,
-                velocity=velocity.ravel(),
-            ),
+            bodies=bodies,
+            assets=[
+                mjcf.block_mesh("block", self.length, self.height, self.height),
+                mjcf.block_mesh("half", half, self.height, self.height),
+            ],
+            tile=self.length,
+            velocity=velocity.ravel(),
             planar=True,
         )

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 # half axes of a shape for its radius: boxes x, y, z; cylinders and capsules radius, half length
 SHAPES = {
@@ -21,7 +21,7 @@ SHAPES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrimitiveSoup:
+class PrimitiveSoup(Published):
     """Bodies of four shapes, turned at random, that fall into an open box and come to rest.
 
     Faces of boxes meet in several points, most of them redundant; other shapes meet in one, which
@@ -37,10 +37,8 @@ class PrimitiveSoup:
     )
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 240
-    allowance: ClassVar[bool] = False  # its published states have none
 
     bodies: int = parameter(120, "1", "number of bodies, at least 1")
     radius: float = parameter(1.0, "m", "of the ball in which a body fits")
@@ -90,19 +88,8 @@ class PrimitiveSoup:
                     turned[i],
                 )
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                type(self).__name__,
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-                multiccd=False,
-            ),
-            law="gap",
+        return Scene.of_bodies(
+            self, seed, bodies=bodies, tile=0.25 * self.width, multiccd=False, law="gap"
         )
 
     def _surface(self) -> str:

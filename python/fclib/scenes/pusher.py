@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 NEAR, FAR = 0.3, 0.85  # of the blade from the shoulder, in lengths of the whole arm
 KEYS = 16  # of the way there, and of the way back
@@ -21,7 +21,7 @@ IRON = "0.45 0.47 0.5 1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pusher:
+class Pusher(Published):
     """An arm of three vertical hinges leads a blade on a straight line through a pile of blocks.
 
     Blocks of drawn sizes fall onto the floor before the blade. It pushes them outwards: they heap
@@ -33,11 +33,8 @@ class Pusher:
     title: ClassVar[str] = "Arm pushing a pile"
     description: ClassVar[str] = "An arm pushes a pile of blocks over the floor with a blade."
     application: ClassVar[str] = "robotics, manipulation"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "robots"
     problems: ClassVar[int] = 1000
-    allowance: ClassVar[bool] = False  # its published states have none
 
     blocks: int = parameter(40, "1", "number of blocks, at least 1")
     across: int = parameter(4, "1", "blocks side by side before the blade, at least 1")
@@ -93,28 +90,22 @@ class Pusher:
             keys.append(
                 f'<key name="gait{len(keys)}" time="{time!r}" ctrl="{mjcf.numbers(*angles)}"/>'
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Pusher",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.5 * self.arm,
-                rest=[
-                    "<actuator>",
-                    *(
-                        f'<position joint="{name}" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>'
-                        for name in ("shoulder", "elbow", "wrist")
-                    ),
-                    "</actuator>",
-                    "<keyframe>",
-                    *keys,
-                    "</keyframe>",
-                ],
-            ),
+            bodies=bodies,
+            tile=0.5 * self.arm,
+            rest=[
+                "<actuator>",
+                *(
+                    f'<position joint="{name}" kp="{STIFFNESS!r}" kv="{DAMPING!r}"/>'
+                    for name in ("shoulder", "elbow", "wrist")
+                ),
+                "</actuator>",
+                "<keyframe>",
+                *keys,
+                "</keyframe>",
+            ],
         )
 
     @property

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 Pair = tuple[float, float]
 
@@ -24,7 +24,7 @@ LIFTED = math.radians(80)  # angle of the crank at which the foot is highest
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quadruped:
+class Quadruped(Published):
     """A walker whose four legs are four-bar linkages, trotting over blocks of drawn heights.
 
     Each leg is a linkage whose coupler goes on to the foot: a crank driven at constant speed
@@ -41,11 +41,8 @@ class Quadruped:
         "A walker with four legs of closed linkages, driven by cranks over uneven ground."
     )
     application: ClassVar[str] = "robotics, mechanisms"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     crank: float = parameter(0.06, "m", "length of a crank; the legs are in proportion")
     mass: float = parameter(8.0, "kg", "mass of the trunk")
@@ -101,31 +98,25 @@ class Quadruped:
         )
         # backwards: the foot that stands goes to the rear
         controls = mjcf.numbers(*[-self.speed] * 4)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Quadruped",
-                bodies=[
-                    *mjcf.uneven_ground(
-                        random, self.roughness, self.block, (-10 * a, 40 * a), 7 * a, self.mu
-                    ),
-                    trunk,
-                ],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.block,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    "<actuator>",
-                    *motors,
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=[
+                *mjcf.uneven_ground(
+                    random, self.roughness, self.block, (-10 * a, 40 * a), 7 * a, self.mu
+                ),
+                trunk,
+            ],
+            tile=self.block,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                "<actuator>",
+                *motors,
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class RockingBlock:
+class RockingBlock(Published):
     """A block that is tilted and let go; each time it comes down it strikes with its other edge.
 
     A slender block turns about an edge for (1/p) acosh(1 / (1 - theta / alpha)) until it comes
@@ -25,10 +25,8 @@ class RockingBlock:
     description: ClassVar[str] = "A slender block in the plane that rocks from edge to edge."
     application: ClassVar[str] = "impacts"
     authors: ClassVar[str] = "the authors of FCLIB, after G. W. Housner"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 300
-    allowance: ClassVar[bool] = False  # its published states have none
 
     width: float = parameter(0.2, "m", "of the block")
     height: float = parameter(2.0, "m", "of the block")
@@ -60,24 +58,16 @@ class RockingBlock:
         # on the right edge, at the origin; just closed
         x = -half * math.sin(self.slenderness - angle)
         z = half * math.cos(self.slenderness - angle) - 1e-9
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "RockingBlock",
-                bodies=[
-                    mjcf.block(
-                        "block", (0.0, 0.0), "block", self.mass, mjcf.surface(self.mu)
-                    ).replace('material="solid"', 'material="solid" rgba="0.45 0.5 0.6 1"')
-                ],
-                assets=[mjcf.block_mesh("block", self.width, self.width, self.height)],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.width,
-                rest=[
-                    f'<keyframe><key name="start" qpos="{mjcf.numbers(x, z, angle)}"/></keyframe>'
-                ],
-            ),
+            bodies=[
+                mjcf.block("block", (0.0, 0.0), "block", self.mass, mjcf.surface(self.mu)).replace(
+                    'material="solid"', 'material="solid" rgba="0.45 0.5 0.6 1"'
+                )
+            ],
+            assets=[mjcf.block_mesh("block", self.width, self.width, self.height)],
+            tile=self.width,
+            rest=[f'<keyframe><key name="start" qpos="{mjcf.numbers(x, z, angle)}"/></keyframe>'],
             planar=True,
         )

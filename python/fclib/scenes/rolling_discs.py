@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollingDiscs:
+class RollingDiscs(Published):
     """Discs of a few sizes that fall in a column and spread into a heap on a rough floor.
 
     Bodies move in a vertical plane (n = 3 for each). A contact has three components: N, T and the
@@ -25,11 +25,9 @@ class RollingDiscs:
     title: ClassVar[str] = "Rolling discs"
     description: ClassVar[str] = "Discs poured on a floor in a vertical plane, rolling friction."
     application: ClassVar[str] = "granular matter"
-    authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb and rolling in the plane, the same coefficients everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 350
-    allowance: ClassVar[bool] = False  # its published states have none
 
     discs: int = parameter(80, "1", "number of discs, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a disc")
@@ -77,18 +75,12 @@ class RollingDiscs:
                     f' rgba="{mjcf.shade(i, self.discs)}"',
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "RollingDiscs",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                condim=6,
-                floor_mu_r=self.mu_r,
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            condim=6,
+            floor_mu_r=self.mu_r,
             planar=True,
         )

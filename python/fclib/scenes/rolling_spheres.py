@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollingSpheres:
+class RollingSpheres(Published):
     """Spheres of a few sizes that fall in a column and spread into a heap.
 
     Without rolling friction they would roll away; with it the heap keeps a slope. A contact has
@@ -26,11 +26,9 @@ class RollingSpheres:
     title: ClassVar[str] = "Rolling spheres"
     description: ClassVar[str] = "Spheres poured on a horizontal floor, with rolling friction."
     application: ClassVar[str] = "granular matter"
-    authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb and rolling, the same coefficients everywhere"
     collection: ClassVar[str] = "rolling"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(100, "1", "number of spheres, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a sphere")
@@ -80,17 +78,6 @@ class RollingSpheres:
                 f' friction="{mu!r} 0 {mu_r!r}" condim="6" material="solid"'
                 f' rgba="{mjcf.shade(i, self.spheres)}"/></body>'
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "RollingSpheres",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                condim=6,
-                floor_mu_r=self.mu_r,
-            ),
+        return Scene.of_bodies(
+            self, seed, bodies=bodies, tile=4 * self.radius, condim=6, floor_mu_r=self.mu_r
         )

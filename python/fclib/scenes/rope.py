@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rope:
+class Rope(Published):
     """Capsules linked by hinges, laid around the upper half of a drum, in the plane.
 
     Its own weight counts: with B = 2 mu / (1 + mu^2) times the weight of a rope as long as the
@@ -23,10 +23,8 @@ class Rope:
     description: ClassVar[str] = "A rope of many links over a rough drum, in the plane."
     application: ClassVar[str] = "multibody systems"
     authors: ClassVar[str] = "the authors of FCLIB, after L. Euler and J. A. Eytelwein"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 120
-    allowance: ClassVar[bool] = False  # its published states have none
 
     over: int = parameter(24, "1", "links on the drum, at least 4")
     short: int = parameter(10, "1", "links of the shorter end, at least 1")
@@ -90,17 +88,6 @@ class Rope:
             f' pos="{mjcf.numbers(0, 0, height)}" {mjcf.surface(self.mu)}'
             ' material="solid" rgba="0.5 0.5 0.5 1"/>'
         )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "Rope",
-                bodies=[drum, text],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-height,
-                tile=self.drum,
-            ),
-            planar=True,
+        return Scene.of_bodies(
+            self, seed, bodies=[drum, text], floor_z=-height, tile=self.drum, planar=True
         )

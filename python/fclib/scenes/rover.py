@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 SIDES = 16  # of a wheel, a prism
 IRON = "0.45 0.47 0.5 1"
@@ -17,7 +17,7 @@ SAND = "0.66 0.56 0.4 1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rover:
+class Rover(Published):
     """A rover of six wheels drives over stones that roll, slide and wedge under it.
 
     On each side a rocker turns about the hull; it has the front wheel, and a bogie with the two
@@ -38,10 +38,8 @@ class Rover:
     description: ClassVar[str] = "A rover of six driven wheels on rockers climbs over loose stones."
     application: ClassVar[str] = "robotics, vehicles"
     authors: ClassVar[str] = "the authors of FCLIB, after D. B. Bickler"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 1000
-    allowance: ClassVar[bool] = False  # its published states have none
 
     stones: int = parameter(80, "1", "number of stones, 0 for even ground")
     across: int = parameter(8, "1", "stones side by side, at least 1")
@@ -113,26 +111,20 @@ class Rover:
         names = [f"{side}{k}" for side in ("left", "right") for k in range(3)]
         kv = self.torque / self.speed
         speeds = mjcf.numbers(*[self.speed] * len(names))
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Rover",
-                bodies=bodies,
-                assets=assets,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=self.base,
-                rest=[
-                    '<equality><joint joint1="leftrocker" joint2="rightrocker"'
-                    ' polycoef="0 -1 0 0 0"/></equality>',
-                    "<actuator>",
-                    *(f'<velocity joint="{name}" kv="{kv!r}"/>' for name in names),
-                    "</actuator>",
-                    f'<keyframe><key name="start" ctrl="{speeds}"/></keyframe>',
-                ],
-            ),
+            bodies=bodies,
+            assets=assets,
+            tile=self.base,
+            rest=[
+                '<equality><joint joint1="leftrocker" joint2="rightrocker"'
+                ' polycoef="0 -1 0 0 0"/></equality>',
+                "<actuator>",
+                *(f'<velocity joint="{name}" kv="{kv!r}"/>' for name in names),
+                "</actuator>",
+                f'<keyframe><key name="start" ctrl="{speeds}"/></keyframe>',
+            ],
             law="gap",
         )
 

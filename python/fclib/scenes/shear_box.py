@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 GREY = "0.5 0.5 0.5 1"
 SINKS = 0.3  # [m/s] the plate under its load, with nothing below it: a damper
@@ -17,7 +17,7 @@ FAST = 1e3  # what drives the box loses 1/FAST of its speed under the load
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShearBox:
+class ShearBox(Published):
     """Discs between two rough plates: the lower half of the box is fast, the upper one is driven.
 
     The upper plate rises and sinks freely under its load. First it settles, then the box is
@@ -38,10 +38,8 @@ class ShearBox:
     description: ClassVar[str] = "Discs sheared between two rough plates under a load; planar."
     application: ClassVar[str] = "granular matter, soil mechanics"
     authors: ClassVar[str] = "the authors of FCLIB, after GDR MiDi"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 800
-    allowance: ClassVar[bool] = False  # its published states have none
 
     across: int = parameter(24, "1", "discs side by side, at least 4")
     layers: int = parameter(10, "1", "layers of discs, at least 2")
@@ -146,19 +144,13 @@ class ShearBox:
             ),
             "</keyframe>",
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "ShearBox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-20 * self.radius,
-                tile=4 * self.radius,
-                rest=drive,
-            ),
+            bodies=bodies,
+            floor_z=-20 * self.radius,
+            tile=4 * self.radius,
+            rest=drive,
             law="gap",
             planar=True,
             focus=(0.0, 0.0, 0.5 * top, 1.2 * half),

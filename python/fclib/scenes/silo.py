@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Silo:
+class Silo(Published):
     """Discs in the plane between two rough walls, on a floor with an outlet in its middle.
 
     With the outlet open the grains flow. With it closed and a floor that sinks slowly, friction on
@@ -27,10 +27,8 @@ class Silo:
     description: ClassVar[str] = "Discs in a narrow silo, at rest or flowing out, under gravity."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "the authors of FCLIB, after H. A. Janssen"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 250
-    allowance: ClassVar[bool] = False  # its published states have none
 
     discs: int = parameter(160, "1", "number of discs, at least 1")
     across: int = parameter(8, "1", "discs from wall to wall, at least 2")
@@ -105,18 +103,12 @@ class Silo:
             f'<actuator><velocity joint="floor" kv="{weight / 1e-3!r}"/></actuator>',
             f'<keyframe><key name="start" ctrl="{self.sink!r}"/></keyframe>',
         ]
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "Silo",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                floor_z=-10 * self.radius,
-                tile=4 * self.radius,
-                rest=drive,
-            ),
+            bodies=bodies,
+            floor_z=-10 * self.radius,
+            tile=4 * self.radius,
+            rest=drive,
             planar=True,
         )

@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank:
+class SliderCrank(Published):
     """Slider-cranks on one shaft; each slider hangs on its rod by a pin in a wider bore.
 
     The rods move in their planes with all three degrees of freedom: at the big end a bilateral
@@ -32,11 +32,8 @@ class SliderCrank:
         "Driven slider-cranks on one shaft, whose pins have clearance in the bores of their rods."
     )
     application: ClassVar[str] = "mechanisms"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
-    allowance: ClassVar[bool] = False  # its published states have none
 
     sliders: int = parameter(4, "1", "number of slider-cranks on the shaft, at least 1")
     crank: float = parameter(0.05, "m", "length of a crank, below that of the rod")
@@ -98,24 +95,18 @@ class SliderCrank:
             for z in (self._height - 3.4 * self.pin, self._height + 3.4 * self.pin)
         ]
         controls = mjcf.numbers(self.speed)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SliderCrank",
-                bodies=[shaft, *bodies, *rails],
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=2 * self.crank,
-                rest=[
-                    "<equality>",
-                    *loops,
-                    "</equality>",
-                    f'<actuator><velocity joint="shaft" kv="{self.gain!r}"/></actuator>',
-                    f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-                ],
-            ),
+            bodies=[shaft, *bodies, *rails],
+            tile=2 * self.crank,
+            rest=[
+                "<equality>",
+                *loops,
+                "</equality>",
+                f'<actuator><velocity joint="shaft" kv="{self.gain!r}"/></actuator>',
+                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+            ],
         )
 
     @property

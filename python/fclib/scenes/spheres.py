@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spheres:
+class Spheres(Published):
     """A column of equal spheres that collapses into a pile.
 
     Coulomb friction alone does not hold a pile on a plane: its spheres roll. Here the ground is a
@@ -28,10 +28,8 @@ class Spheres:
     )
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 200
-    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(250, "1", "number of spheres, at least 1")
     radius: float = parameter(1.0, "m", "radius of a sphere")
@@ -85,15 +83,4 @@ class Spheres:
                     mjcf.shade(i, self.spheres),
                 )
             )
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "Spheres",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=4 * self.radius)

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpheresBox:
+class SpheresBox(Published):
     """Equal spheres in layers, a little disturbed, under a heavy lid that slides down.
 
     The columns buckle under the lid, and the lattice gives way to denser packings. The law of gaps
@@ -28,10 +28,8 @@ class SpheresBox:
     description: ClassVar[str] = "Equal spheres in a box, pressed by a wall that moves down."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 32
-    allowance: ClassVar[bool] = False  # its published states have none
     # parameters of a small scene, which is simulated quickly
     small: ClassVar[Mapping[str, Any]] = {"spheres": 36, "along_x": 4, "along_y": 3}
 
@@ -86,17 +84,11 @@ class SpheresBox:
             ' material="solid" rgba="0.45 0.47 0.5 1"/></body>'
         )
         bodies += mjcf.walls((x, y), height, self.mu)
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SpheresBox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                rest=mjcf.margins(self.margin),
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            rest=mjcf.margins(self.margin),
             law="gap",
         )

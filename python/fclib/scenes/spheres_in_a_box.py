@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpheresInABox:
+class SpheresInABox(Published):
     """Spheres of a range of sizes, poured into an open box, that come to rest.
 
     As many as the box's section holds lie in a layer of the start, the layers a little apart. The
@@ -28,10 +28,8 @@ class SpheresInABox:
     description: ClassVar[str] = "Spheres of many sizes poured into an open box, under gravity."
     application: ClassVar[str] = "granular matter"
     authors: ClassVar[str] = "V. Acary"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 240
-    allowance: ClassVar[bool] = False  # its published states have none
 
     spheres: int = parameter(150, "1", "number of spheres, at least 1")
     radius: float = parameter(1.0, "m", "largest radius of a sphere")
@@ -89,15 +87,4 @@ class SpheresInABox:
             z = self.lift + pitch * (layer + 0.5)
             place = np.array([x, y, z]) + room * (2 * draws[i, 1:] - 1)
             bodies.append(mjcf.sphere(i, self.spheres, place, radius, self.density, friction))
-        return Scene.of(
-            self,
-            seed,
-            mjcf.document(
-                "SpheresInABox",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=0.25 * self.width,
-            ),
-        )
+        return Scene.of_bodies(self, seed, bodies=bodies, tile=0.25 * self.width)

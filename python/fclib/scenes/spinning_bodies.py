@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from fclib.scenes.shared import mjcf
-from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.family import Published, Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpinningBodies:
+class SpinningBodies(Published):
     """Flat ellipsoids that fall spinning into a box.
 
     The gyroscopic moment is taken at the end of a step: M has h times its derivative, and neither M
@@ -22,11 +22,8 @@ class SpinningBodies:
     title: ClassVar[str] = "Spinning bodies"
     description: ClassVar[str] = "Flat ellipsoids that fall spinning fast; W is not symmetric."
     application: ClassVar[str] = "multibody systems"
-    authors: ClassVar[str] = "the authors of FCLIB"
-    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 150
-    allowance: ClassVar[bool] = False  # its published states have none
 
     bodies: int = parameter(48, "1", "number of bodies, at least 1")
     across: int = parameter(4, "1", "bodies of a layer along x and along y, at least 1")
@@ -74,16 +71,10 @@ class SpinningBodies:
                     turned[i],
                 )
             )
-        return Scene.of(
+        return Scene.of_bodies(
             self,
             seed,
-            mjcf.document(
-                "SpinningBodies",
-                bodies=bodies,
-                time_step=self.time_step,
-                gravity=self.gravity,
-                floor_mu=self.mu,
-                tile=4 * self.radius,
-                velocity=np.column_stack((np.zeros_like(axes), axes)).ravel(),
-            ),
+            bodies=bodies,
+            tile=4 * self.radius,
+            velocity=np.column_stack((np.zeros_like(axes), axes)).ravel(),
         )

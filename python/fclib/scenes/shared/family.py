@@ -8,7 +8,7 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
 from xml.etree import ElementTree
@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
 from fclib._regular import regular
-from fclib.scenes.shared import siconos_input, siconos_scene
+from fclib.scenes.shared import mjcf, siconos_input, siconos_scene
 from fclib.scenes.shared.interaction import Drive, Interaction
 from fclib.scenes.shared.solids import Solids
 
@@ -97,6 +97,20 @@ class Scene:
             friction=family.friction,
             **more,
         )
+
+    @classmethod
+    def of_bodies(cls, family: Any, seed: int, **more: Any) -> Scene:
+        """The scene of a family of bodies above a floor, with its gravity and friction.
+
+        Args:
+            family: the family.
+            seed: of what is random.
+            more: fields of the scene, and what `mjcf.document` takes.
+        """
+        fields_of_scene = {one.name for one in fields(cls)}
+        words = {key: more.pop(key) for key in [*more] if key not in fields_of_scene}
+        words |= {"time_step": family.time_step, "gravity": family.gravity, "floor_mu": family.mu}
+        return cls.of(family, seed, mjcf.document(type(family).__name__, **words), **more)
 
     @classmethod
     def from_file(
@@ -443,7 +457,7 @@ class Family(Described, Protocol):
 
     If it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
-    A published family sets `allowance` to False, since its states were simulated without.
+    A family whose published states were simulated without sets `allowance` to False.
 
     If the default scene takes long, `small` holds parameters of a quick one of the kind.
     """
@@ -454,6 +468,14 @@ class Family(Described, Protocol):
     def scene(self, seed: int = 0) -> Scene:
         """The scene of these parameters; the same seed gives the same scene, bit for bit."""
         ...
+
+
+class Published:
+    """What most families have in common whose states are published; one may say otherwise."""
+
+    authors: ClassVar[str] = "the authors of FCLIB"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    allowance: ClassVar[bool] = False  # their published states have none
 
 
 def parameter(default: Any, unit: str, doc: str) -> Any:

@@ -580,6 +580,25 @@ def test_nothing_in_contact() -> None:
     json.dumps(found.record, allow_nan=False)
 
 
+def test_without_a_solution_nothing_is_unique() -> None:
+    closing = fclib.LocalProblem(spacedim=2, W=np.zeros((2, 2)), q=[-1.0, 0.0], mu=[0.0])
+    floating = fclib.GlobalProblem(
+        M=np.eye(1), H=np.zeros((1, 0)), G=np.ones((1, 2)), f=[1.0], w=[], b=[0.0, 1.0], mu=[]
+    )
+    for problem in (closing, floating):
+        found = analysis.analyze(problem)
+        assert found.existence.verdict == analysis.PROVEN_NOT
+        assert found.uniqueness.verdict == found.reactions.verdict == "undecided"
+        assert found.self_stress.verdict != analysis.SOLVABLE
+
+
+def test_friction_whose_square_overflows_is_analysed() -> None:
+    problem = local_problem(np.eye(3), [-1, 1, 0], [1e300])
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.EXISTS_SLATER
+    assert np.isnan(found.uniqueness.contraction)
+
+
 def test_every_key_is_documented(root: Path) -> None:
     text = (root / "docs" / "analysis.md").read_text()
     problem = squeezed(3, 0.4, 1)

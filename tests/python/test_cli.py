@@ -709,7 +709,42 @@ def test_solvers_of_ones_own_are_taken_from_a_file(tmp_path: Path) -> None:
     for command in (["solve", file], ["solvers"]):
         absent = run(*command, "--module", tmp_path / "absent.py")
         assert absent.returncode == 2
-        assert "absent.py" in absent.stderr
+        assert "absent.py: there is no such file" in absent.stderr
+
+
+def test_an_infinite_tolerance_is_refused(files: list[Path]) -> None:
+    for command in ("solve", "check", "analyze"):
+        refused = run(command, files[0], "--tol", "inf")
+        assert refused.returncode == 2
+        assert "--tol" in refused.stderr
+        assert not refused.stdout
+
+
+def test_a_name_that_the_output_cannot_encode_is_no_error(tmp_path: Path) -> None:
+    problem = fclib.LocalProblem(W=np.eye(3), q=-np.ones(3), mu=np.full(1, 0.5))
+    fclib.write(tmp_path / "caf\u00e9.hdf5", problem)
+    shown = subprocess.run(
+        [sys.executable, "-m", "fclib", "info", "caf\u00e9.hdf5"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "caf\\xe9.hdf5" in shown.stdout
+    assert not shown.stderr
+
+
+def test_a_view_in_place_of_a_folder_leaves_nothing_behind(
+    files: list[Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "page"
+    folder.mkdir()
+    before = sorted(tmp_path.iterdir())
+    refused = run("view", files[0], "--out", folder)
+    assert refused.returncode == 1
+    assert f"{folder}: Is a directory" in refused.stderr
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_the_help_of_campaigns_shows_their_options() -> None:

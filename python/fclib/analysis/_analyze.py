@@ -25,9 +25,9 @@ from fclib.analysis._data import (
     columns,
 )
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
-from fclib.analysis._existence import Existence, Slater, existence, slater
+from fclib.analysis._existence import PROVEN_NOT, Existence, Slater, existence, slater
 from fclib.analysis._joints import Joints, joints_of
-from fclib.analysis._reactions import Reactions, reactions
+from fclib.analysis._reactions import UNDECIDED, Reactions, reactions
 from fclib.analysis._self_stress import SelfStress, self_stress
 from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
@@ -319,6 +319,9 @@ def analyze(
         states = enumerate_solutions(problem, time_limit=min(time_limit, ENUMERATION))
         unique = enumerated(unique, states)
     verdict = existence(data, joints, condition, states, tol, time_limit)
+    if verdict.verdict == PROVEN_NOT:
+        # theorems of uniqueness say that there is at most one solution
+        unique = replace(unique, verdict="undecided", reason="there is no solution")
     numbers = data.local.islands().contact
     return Analysis(
         problem=problem,
@@ -337,7 +340,9 @@ def analyze(
         slater=condition,
         existence=verdict,
         uniqueness=unique,
-        reactions=reactions(
+        reactions=Reactions(UNDECIDED, unique.reason)
+        if verdict.verdict == PROVEN_NOT
+        else reactions(
             data,
             unique.verdict,
             unique.reactions,
@@ -474,7 +479,11 @@ def _contraction(data: Data, reduced: Reduced, dense: int) -> float:
             return float("nan")
         selected = np.eye(rows.size)[:, up]
         inverse = cho_solve(factor, selected)[up]
-        push = np.linalg.eigvalsh(weight[:, None] * block * weight)[-1]
+        with np.errstate(over="ignore"):
+            friction = weight[:, None] * block * weight
+        if not np.isfinite(friction).all():
+            return float("nan")
+        push = np.linalg.eigvalsh(friction)[-1]
         worst = max(worst, float(push * np.linalg.eigvalsh((inverse + inverse.T) / 2)[-1]))
     return float(np.sqrt(worst * len(data.friction)))
 

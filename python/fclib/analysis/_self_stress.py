@@ -89,6 +89,8 @@ def self_stress(
     Raises:
         ImportError: Clarabel is needed, but not installed.
     """
+    if data.problem.nc == 0 and not joints.agree:
+        return SelfStress(OPEN, joints.reason)
     if data.problem.nc == 0:
         return SelfStress(SOLVABLE, "there is no contact", np.zeros(0), 1.0, 0.0)
     reason = "no velocity strictly inside K* was found"

@@ -16,6 +16,8 @@ _profile.py    the profile of `profile` and `demo`
 from __future__ import annotations
 
 import importlib
+import io
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -123,6 +125,10 @@ def main(imported: Callable[[], Any] | None = None) -> None:
     Args:
         imported: called once all is imported, before the command begins.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            # what the terminal cannot show, as names of files, is no error
+            stream.reconfigure(errors="backslashreplace")
     try:
         app(obj=imported)
     except fclib.Error as error:

@@ -80,7 +80,17 @@ GAP = 2  # between columns
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
-Tolerance = Annotated[float, typer.Option("--tol", help="Bound on the error.", min=0.0)]
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
+        raise typer.BadParameter("with an infinite bound, anything would be a solution")
+    return value
+
+
+Tolerance = Annotated[
+    float, typer.Option("--tol", help="Bound on the error.", min=0.0, callback=_finite)
+]
 Modules = Annotated[
     list[Path] | None,
     typer.Option("--module", help="A file of Python with solvers of your own."),
@@ -145,6 +155,9 @@ def usage_error(error: Exception) -> NoReturn:
 
 def load_modules(paths: Sequence[Path] | None) -> None:
     """Import files with solvers of the user's own; a usage error if that fails."""
+    for path in paths or ():
+        if not path.is_file():
+            raise typer.BadParameter(f"{path}: there is no such file")
     try:
         from fclib.bench import modules  # takes a while
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from collections.abc import Mapping
+from errno import EISDIR
 from pathlib import Path
 from typing import Any
 
@@ -270,7 +272,12 @@ def write_view(
         "/*SCRIPTS*/": "\n".join(elements),
     }.items():
         page = page.replace(mark, text)
+    if path.is_dir():
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     part = path.with_name(f".{path.name}.part")
-    # the name of a file may not be valid text
-    part.write_text(page, encoding="utf-8", errors="replace")
-    part.replace(path)
+    try:
+        # the name of a file may not be valid text
+        part.write_text(page, encoding="utf-8", errors="replace")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import random
 import shutil
@@ -872,6 +873,8 @@ def test_one_form_of_a_problem_is_run(
         ({"tolerance": 1e-8}, "tolerance: is not known here; did you mean tolerances"),
         ({"seed": "a"}, "seed: 'a'"),
         ({"tolerances": [-1]}, "positive"),
+        ({"tolerances": [math.inf]}, "tolerances: with an infinite bound"),
+        ({"from_history": [math.inf]}, "from_history: with an infinite bound"),
         ({"time_limit": "long"}, "time_limit.*long"),
         ({"repeats": 0}, "repeats"),
         ({"modules": ["absent.py"]}, r"absent\.py"),

@@ -23,6 +23,7 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import results
+from workshop.tables import two_machines
 
 PLAN = {
     "name": "small",
@@ -299,6 +300,27 @@ def test_the_interval_of_a_ratio_covers_that_of_another_solver() -> None:
     assert 360 <= covered <= 396
     with pytest.raises(ValueError, match="do not compare"):
         ratio_of(CALIBRATED, replace(CALIBRATED, version=0))
+
+
+@pytest.mark.parametrize(("slower", "within"), [(3.0, "yes"), (3.5, "no")])
+def test_two_machines_are_compared_solver_by_solver(
+    slower: float, within: str, tmp_path: Path
+) -> None:
+    """By its calibration the second machine is three times slower, by each solve the same."""
+    solvers = ["nsgs", "apgd"]
+    first = store(tmp_path / "a.sqlite", facts("a", 1.0), solvers)
+    second = store(tmp_path / "b.sqlite", facts("b", 3.0), solvers, cpu=0.01 * slower)
+    ratio = ratio_of(*map(two_machines.calibration_of, (second, first)))
+    near = replace(ratio, low=2.9, high=3.1)
+    times = [two_machines.times_of(path) for path in (first, second)]
+    rows = two_machines.rows_of(times[0], times[1], near, 0.001)
+    assert sorted(row["solver"] for row in rows) == sorted(solvers)
+    assert {row["within"] for row in rows} == {within}
+    assert {row["times, B over A"] for row in rows} == {f"{slower:.3g}"}
+    assert two_machines.rows_of(times[0], times[1], near, 0.02) == []  # too short in A
+    bare = store(tmp_path / "bare.sqlite", facts("a", None), solvers)
+    with pytest.raises(SystemExit, match="has 0 calibrations"):
+        two_machines.calibration_of(bare)
 
 
 @pytest.mark.parametrize(

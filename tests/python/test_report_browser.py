@@ -793,9 +793,7 @@ WAYS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_problem_is_found_seen_taken_and_cited(
-    way: str, browser: Any, masonry: Path
-) -> None:
+def test_a_problem_is_found_seen_taken_and_cited(way: str, browser: Any, masonry: Path) -> None:
     go = Opener(browser, masonry)
     page = go("", **WAYS[way])
     presses = 0

@@ -502,6 +502,13 @@ def _positive(value: object, where: str) -> float:
     return number
 
 
+def _tolerance(value: object, where: str) -> float:
+    number = _positive(value, where)
+    if math.isinf(number):
+        raise CampaignError(f"{where}: with an infinite bound, anything would be a solution")
+    return number
+
+
 def _count(entries: Mapping[str, Any], name: str, default: int, where: str = "") -> int:
     value = entries.get(name, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 1:
@@ -530,7 +537,7 @@ def _larger(entries: Mapping[str, Any]) -> tuple[float, ...]:
     values = entries.get("from_history", [])
     if not isinstance(values, list):
         raise CampaignError("from_history: is no list of tolerances, as in from_history = [1e-4]")
-    return tuple(_positive(value, "from_history") for value in values)
+    return tuple(_tolerance(value, "from_history") for value in values)
 
 
 def _made(recipe: Mapping[str, Any], where: str) -> None:
@@ -591,7 +598,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         raise CampaignError(f"{where}tolerances: the list is empty")
     time = _positive(values["time_limit"], f"{where}time_limit")
     return Group(
-        tolerances=tuple(_positive(x, f"{where}tolerances") for x in tolerances),
+        tolerances=tuple(_tolerance(x, f"{where}tolerances") for x in tolerances),
         limits=Limits(
             time=time,
             wall=_positive(values.get("wall_limit", time), f"{where}wall_limit"),

@@ -82,14 +82,15 @@ Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=F
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
 
 
-def _finite(value: float) -> float:
+def finite_tolerance(value: float) -> float:
+    """A tolerance as it is given; a usage error if it is infinite."""
     if not math.isfinite(value):
         raise typer.BadParameter("with an infinite bound, anything would be a solution")
     return value
 
 
 Tolerance = Annotated[
-    float, typer.Option("--tol", help="Bound on the error.", min=0.0, callback=_finite)
+    float, typer.Option("--tol", help="Bound on the error.", min=0.0, callback=finite_tolerance)
 ]
 Modules = Annotated[
     list[Path] | None,

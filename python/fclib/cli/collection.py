@@ -35,6 +35,7 @@ from fclib.cli._output import (
     Rows,
     err,
     fail,
+    finite_tolerance,
     out,
     progress_bar,
     usage_error,
@@ -304,7 +305,10 @@ def simulate(
         typer.Option(help="Name of the version; a published one is a number, higher than before."),
     ] = "own",
     solver: Annotated[str, typer.Option(help="Solver of each step.")] = "auto",
-    tol: Annotated[float, typer.Option(help="Bound on the error of each step.", min=0.0)] = 1e-12,
+    tol: Annotated[
+        float,
+        typer.Option(help="Bound on the error of each step.", min=0.0, callback=finite_tolerance),
+    ] = 1e-12,
     seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
     count: Annotated[
         int | None,

@@ -97,15 +97,7 @@ class FourBar(Published):
             bodies=bodies,
             assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
             tile=4 * self.block,
-            rest=[
-                "<equality>",
-                *loops,
-                "</equality>",
-                "<actuator>",
-                *motors,
-                "</actuator>",
-                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-            ],
+            rest=mjcf.driven(loops, motors, controls),
         )
 
     @property

@@ -108,15 +108,7 @@ class Quadruped(Published):
                 trunk,
             ],
             tile=self.block,
-            rest=[
-                "<equality>",
-                *loops,
-                "</equality>",
-                "<actuator>",
-                *motors,
-                "</actuator>",
-                f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
-            ],
+            rest=mjcf.driven(loops, motors, controls),
         )
 
     @property

@@ -200,6 +200,19 @@ def surface(mu: float, mu_r: float | None = None, mu_s: float | None = None) -> 
     return f'friction="{mu!r} 0 {mu_r!r}" condim="6"'
 
 
+def driven(loops: Iterable[str], motors: Iterable[str], controls: str) -> list[str]:
+    """What closes and drives linkages: equalities, actuators, and their controls at the start."""
+    return [
+        "<equality>",
+        *loops,
+        "</equality>",
+        "<actuator>",
+        *motors,
+        "</actuator>",
+        f'<keyframe><key name="start" ctrl="{controls}"/></keyframe>',
+    ]
+
+
 def grain(
     name: str,
     place: Iterable[float],

@@ -392,7 +392,7 @@ double fclib_merit_local_spin(struct fclib_local_spin* problem, enum fclib_merit
 
 /** New. What a caller asks of a solver. A struct of zeros asks for the defaults. */
 struct fclib_solve_options {
-  double tolerance;    /**< on MERIT_2; 0 for 1e-8 */
+  double tolerance;    /**< on MERIT_2, finite; 0 for 1e-8 */
   int max_iterations;  /**< 0 for the solver's own */
   double time_limit;   /**< wall clock [s]; 0 for none */
   const double* guess; /**< reactions to start from (m), or NULL */

@@ -346,9 +346,7 @@ void check_law(const Batch& batch) {
 BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
   check_law(batch);
   if (batch.count < 0) refuse("count", "is negative");
-  if (!(settings.tolerance >= 0)) {
-    throw Error(ErrorKind::option, "is not a number that is not negative", "tolerance");
-  }
+  check_tolerance(settings.tolerance);
   if (settings.threads < 0) throw Error(ErrorKind::option, "is negative", "threads");
   // a dense matrix of the core counts its entries by 32 bits
   constexpr std::int32_t most = 15000;

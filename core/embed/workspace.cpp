@@ -167,6 +167,7 @@ Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& p
 
 Workspace::Answer Workspace::solve(const LocalView& problem, std::span<const std::int64_t> contacts,
                                    const Settings& settings) {
+  check_tolerance(settings.tolerance);
   require_sizes(problem, contacts.size());
   const std::size_t m = problem.q.size();
   grow(r_, m);

@@ -544,6 +544,7 @@ Result solve_consistent(const P& given, const Request& request, const Solution& 
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
+  check_tolerance(settings.tolerance);
   Stopwatch watch;
   const Deadline deadline(settings.time_limit, settings.clock);
   const Request request{solver, settings, options, deadline, watch};

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "deadline.hpp"
+#include "error.hpp"
 #include "linalg/stopwatch.hpp"
 #include "merit_kind.hpp"
 #include "reduced/reduced_problem.hpp"
@@ -82,6 +83,14 @@ struct Settings {
   Clock clock;                                    ///< another than the steady one, for tests
   bool history = false;                           ///< whether the result keeps all reports
 };
+
+/// Throws Error (option) unless a tolerance is a finite number of 0 or more. With an infinite one,
+/// anything would be a solution.
+inline void check_tolerance(double tolerance) {
+  if (!(tolerance >= 0 && tolerance <= std::numeric_limits<double>::max())) {
+    throw Error(ErrorKind::option, "is not a finite number of 0 or more", "tolerance");
+  }
+}
 
 /// Watches over a solver: the solver reports its iterates, and learns whether to stop.
 class Monitor {

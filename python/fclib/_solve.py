@@ -79,10 +79,8 @@ def solve(
         SolverError: a solver outside of fclib failed.
     """
     try:
-        if not tol >= 0:
-            raise _core.OptionError(f"tol: {tol} is not a positive number")
-        if math.isinf(tol):
-            raise _core.OptionError("tol: with an infinite bound, anything would be a solution")
+        if not 0 <= tol < math.inf:
+            raise _core.OptionError(f"tol: {tol} is not a finite number of 0 or more")
         if max_iterations is not None and max_iterations < 1:
             raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
         if time_limit is not None and not time_limit > 0:

@@ -6,7 +6,6 @@ the campaign `quick` -> runs in limited processes -> store -> profile
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 import fclib
 from fclib import bench
+from fclib._files import write_csv
 
 # solvers with their options
 CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -81,9 +81,6 @@ def campaign(store: Path, jobs: int, show: Callable[[bench.Progress], None]) -> 
     return bench.run_campaign(bench.Campaign.read(CAMPAIGN), store, jobs=jobs, show=show)
 
 
-def write_csv(path: Path, runs: Sequence[bench.Run]) -> None:
+def write_runs(path: Path, runs: Sequence[bench.Run]) -> None:
     """All runs, one row each."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, bench.COLUMNS)
-        writer.writeheader()
-        writer.writerows(run.record for run in runs)
+    write_csv(path, bench.COLUMNS, ([run.record[name] for name in bench.COLUMNS] for run in runs))

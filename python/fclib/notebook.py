@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fclib._files import write_text
 from fclib.bench import comparison, profiles
 from fclib.bench.plots import COLOURS
 from fclib.report import view as views
@@ -54,7 +55,7 @@ class View:
 
     def save(self, path: str | Path) -> None:
         """Write the page. OSError."""
-        Path(path).write_text(self.page, encoding="utf-8")
+        write_text(Path(path), self.page)
 
 
 def view(problem: Any, solution: Any = None) -> View:

@@ -496,6 +496,9 @@ static void solving(void) {
   options.options = NULL;
   options.tolerance = -1;
   CHECK(!fclib_solve_local(&a, "nsgs", &options, &s, &result));
+  options.tolerance = INFINITY;
+  CHECK(!fclib_solve_local(&a, "nsgs", &options, &s, &result));
+  SAYS("finite");
   CHECK(!fclib_solve_local(&a, NULL, NULL, &s, &result));
   CHECK(!fclib_solve_local(&a, "nsgs", NULL, NULL, &result));
   s.r = NULL;

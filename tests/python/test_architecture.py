@@ -65,6 +65,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 # in a file an import stands, it counts. "__init__" is what `import fclib` gives
 PYTHON: dict[str, set[str]] = {
     "_entry_points": set(),
+    "_files": set(),
     "_geometry": set(),
     "_stored": set(),
     "_suggest": set(),
@@ -106,6 +107,7 @@ PYTHON: dict[str, set[str]] = {
     "simulate": {"_core", "_geometry", "_laws", "_origin", "_regular", "_solve", "scenes"},
     "recorders": {"_core", "_laws", "_origin", "_sequence", "_solve", "external", "scenes"},
     "collections": {
+        "_files",
         "_laws",
         "_core",
         "_digest",
@@ -123,6 +125,7 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
     },
     "bench": {
+        "_files",
         "_laws",
         "_core",
         "_digest",
@@ -141,8 +144,18 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
         "collections",
     },
-    "results": {"_core", "_verdicts", "_judge", "_digest", "_stored", "bench", "collections"},
+    "results": {
+        "_files",
+        "_core",
+        "_verdicts",
+        "_judge",
+        "_digest",
+        "_stored",
+        "bench",
+        "collections",
+    },
     "report": {
+        "_files",
         "_laws",
         "_core",
         "_geometry",
@@ -155,7 +168,7 @@ PYTHON: dict[str, set[str]] = {
         "bench",
         "collections",
     },
-    "notebook": {"bench", "report"},
+    "notebook": {"_files", "bench", "report"},
     "__init__": {
         "_batch",
         "_batch_derivatives",
@@ -172,9 +185,10 @@ PYTHON: dict[str, set[str]] = {
         "collections",
         "notebook",
     },
-    "demo": {"__init__", "scenes", "simulate", "bench"},
+    "demo": {"_files", "__init__", "scenes", "simulate", "bench"},
     "doctor": {"_core", "__init__", "external"},
     "cli": {
+        "_files",
         "_laws",
         "_judge",
         "_registry",

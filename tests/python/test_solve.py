@@ -490,7 +490,7 @@ def test_a_name_with_spaces_is_a_name(tmp_path: Path) -> None:
         ({"shuffle": 1}, "shuffle"),
         ({"tol": -1e-8}, "tol"),
         ({"tol": float("nan")}, "tol"),
-        ({"tol": float("inf")}, "tol: with an infinite bound"),
+        ({"tol": float("inf")}, "tol: inf is not a finite number of 0 or more"),
         ({"max_iterations": 0}, "max_iterations"),
         ({"max_iterations": -5}, "max_iterations"),
         ({"time_limit": 0.0}, "time_limit"),

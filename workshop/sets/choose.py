@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
+from fclib._files import write_text
 from fclib.collections import catalog, set_index, trajectory
 from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
@@ -47,7 +48,7 @@ def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -
         rows.append(json.dumps(row, sort_keys=True))
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
-    catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
+    write_text(path, text)
 
 
 def archive(folder: Path, names: Iterable[str], version: str) -> None:
@@ -275,4 +276,4 @@ def write_local(path: Path, contacts: Iterable[Contact], rule: Mapping[str, Any]
     rows = [json.dumps(contact.record(), sort_keys=True) for contact in contacts]
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
-    catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
+    write_text(path, text)

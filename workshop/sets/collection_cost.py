@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes
-from fclib.collections import catalog, published, set_index
+from fclib._files import write_text
+from fclib.collections import published, set_index
 from workshop.tables import _results
 
 LEFT = ("extended", "ladder")  # of all families, and of any size
@@ -112,7 +113,7 @@ def main() -> None:
             continue
         rows.append(built(folder, arguments.out, options, arguments.limit))
         text = _results.table(list(rows[0]), rows)
-        catalog.replace_file(table, lambda beside, text=text: beside.write_text(text, "utf-8"))
+        write_text(table, text)
         print(*rows[-1].values(), sep="  ", flush=True)
     rows += sums(rows)
     print(*(row for row in rows if "/" not in row["family"]), sep="\n")

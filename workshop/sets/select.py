@@ -35,6 +35,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _digest, _solve
+from fclib._files import write_text
 from fclib._judge import TOLERANCE, trivial
 from fclib.collections import catalog, ratings, trajectory
 from fclib.collections.build import facts_of, guess_for, item_of
@@ -157,7 +158,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
             {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items() if v is not None}
         )
     path.parent.mkdir(parents=True, exist_ok=True)
-    catalog.replace_file(path, lambda beside: beside.write_text(text.getvalue(), encoding="utf-8"))
+    write_text(path, text.getvalue())
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:

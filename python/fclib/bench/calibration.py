@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from fclib import _solve
+from fclib._files import write_text
 from fclib.bench import generated, machine
 
 VERSION: Final = 2  # another set of solves gets another number
@@ -113,9 +114,7 @@ def save(found: Calibration) -> Path:
     """Keep the calibration of this machine: stores say it from now on. OSError."""
     file = machine.calibration_file()
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_suffix(".part")
-    beside.write_text(json.dumps(found.record()), encoding="utf-8")
-    beside.replace(file)
+    write_text(file, json.dumps(found.record()))
     machine.facts.cache_clear()
     return file
 

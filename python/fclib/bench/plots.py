@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fclib._files import replace_file
 from fclib.bench import profiles
 from fclib.bench.comparison import METRICS, Array, Costs, Weigh
 
@@ -183,10 +184,9 @@ def opened(
 def save(drawn: Any, path: Path) -> None:
     """Write a figure, whole or not at all; the same data give the same file."""
     kind = path.suffix[1:]
-    part = path.with_name(f".{path.stem}.part.{kind}")
     stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     try:
-        drawn.savefig(part, **({"metadata": stamp} if stamp else {}))
+        replace_file(path, lambda beside: drawn.savefig(beside, format=kind, metadata=stamp))
     except Exception as error:
         if kind != "pgf":
             raise
@@ -194,7 +194,6 @@ def save(drawn: Any, path: Path) -> None:
         reason = str(error).strip().splitlines()[0]
         raise ValueError(f"PGF: TeX fails: {reason}; PDF and SVG need no TeX") from None
     drawn.set_layout_engine("none")  # the layout is fixed: saves two thirds of the time
-    part.replace(path)
 
 
 def _legend(axes: Any) -> None:

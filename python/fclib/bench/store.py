@@ -16,7 +16,6 @@ up anywhere, or run.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import sqlite3
@@ -33,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core, _sequence
+from fclib._files import replace_file, write_csv
 from fclib._solve import MERITS
 from fclib._verdicts import SOLVED
 from fclib.bench import layout
@@ -1129,21 +1129,14 @@ class Store:
         if path.suffix not in (".csv", ".parquet"):
             raise StoreError(f"{path}: a store is exported to .csv or .parquet")
         table = self.table(more=LONG)
-        part = path.with_name(f".{path.name}.part")
-        try:
-            if path.suffix == ".csv":
-                with part.open("w", newline="", encoding="utf-8") as file:
-                    writer = csv.writer(file)
-                    writer.writerow(table.names)
-                    writer.writerows(zip(*map(table.values, table.names), strict=True))
-            else:
-                import pyarrow as pa
-                import pyarrow.parquet as pq
+        if path.suffix == ".csv":
+            write_csv(path, table.names, zip(*map(table.values, table.names), strict=True))
+        else:
+            import pyarrow as pa
+            import pyarrow.parquet as pq
 
-                pq.write_table(pa.table({name: table.values(name) for name in table.names}), part)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
+            columns = pa.table({name: table.values(name) for name in table.names})
+            replace_file(path, lambda beside: pq.write_table(columns, beside))
         return len(table)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from fclib._files import write_csv
 from fclib.bench import MeritKind, comparison, profiles
 from fclib.bench.campaign import published_means
 from fclib.bench.store import Store
@@ -304,7 +304,7 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     for table, records in tables.items():
         if table != "profile":
-            write_csv(folder / f"{table.replace(' ', '-')}.csv", records)
+            write_rows(folder / f"{table.replace(' ', '-')}.csv", records)
     several = len(costs.tolerances) > 1
     tols = comparison.numbers_in(notes.compared, "tol")
     for tol in costs.tolerances:
@@ -312,9 +312,9 @@ def draw(
         words, ending = notes.caption(part), f"-{tol:g}" if several else ""
         name = f"{costs.metric}{ending}"
         steps = curve_rows(part, profiles.ratios(part.values), "tau", notes.weigh)
-        write_csv(folder / f"performance-{name}.csv", steps)
+        write_rows(folder / f"performance-{name}.csv", steps)
         steps = curve_rows(part, part.values, costs.metric, notes.weigh)
-        write_csv(folder / f"data-{name}.csv", steps)
+        write_rows(folder / f"data-{name}.csv", steps)
         plots.performance(part, folder, formats, words, ending, weigh=notes.weigh)
         for per_contact in (False, True):
             plots.data(
@@ -338,16 +338,10 @@ def draw(
         plots.work_precision(tables["work-precision"], costs.metric, folder, formats, words)
 
 
-def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """A table, whole or not at all."""
-    if not rows:
-        return
-    part = path.with_name(f".{path.name}.part")
-    with part.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    part.replace(path)
+def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write a table, if it has rows."""
+    if rows:
+        write_csv(path, list(rows[0]), (row.values() for row in rows))
 
 
 def curve_rows(

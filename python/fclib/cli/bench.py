@@ -86,10 +86,10 @@ def run(
     ] = None,
     tol: Annotated[list[float] | None, typer.Option(help="Tolerances.")] = None,
     time_limit: Annotated[
-        float | None, typer.Option(help="Limit of CPU time of a run [s].", min=0.0)
+        float | None, typer.Option(help="Limit of CPU time of a run [s].", min=0.001)
     ] = None,
     wall_limit: Annotated[
-        float | None, typer.Option(help="Limit of wall clock of a run [s].", min=0.0)
+        float | None, typer.Option(help="Limit of wall clock of a run [s].", min=0.001)
     ] = None,
     memory: Annotated[
         float | None, typer.Option(help="Limit of memory of a run [MB].", min=0.0)

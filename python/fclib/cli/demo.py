@@ -96,7 +96,7 @@ def command(
     for path in each_file(paths, "solving"):
         runs += demo.solve(path, tol)
     table = out_dir / "runs.csv"
-    demo.write_csv(table, runs)
+    demo.write_runs(table, runs)
 
     report = Report(as_json)
     for run in runs:

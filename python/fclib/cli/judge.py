@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib._files import write_csv
 from fclib._sequence import SUFFIXES, steps_or_file
 from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error
 
@@ -127,9 +127,6 @@ def judged(folders: dict[str, Path], every: int) -> dict[str, Sequence[Any]]:
 
 def write_table(runs: dict[str, Sequence[Any]], path: Path) -> None:
     """Write a row for each step."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        first = next(iter(runs.values()))[0]
-        writer = csv.DictWriter(file, ["run", *asdict(first)], lineterminator="\n")
-        writer.writeheader()
-        for name, steps in runs.items():
-            writer.writerows({"run": name, **asdict(step)} for step in steps)
+    columns = ["run", *asdict(next(iter(runs.values()))[0])]
+    rows = ((name, *asdict(step).values()) for name, steps in runs.items() for step in steps)
+    write_csv(path, columns, rows)

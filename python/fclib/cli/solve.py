@@ -59,7 +59,7 @@ def command(
     tol: Tolerance = 1e-8,
     merit: Merit = MeritKind.both,
     time_limit: Annotated[
-        float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.0)
+        float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.001)
     ] = None,
     kind: Annotated[
         str | None,

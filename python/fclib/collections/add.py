@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _sequence
+from fclib._files import replace_file
 from fclib._judge import MARK, TOLERANCE, judge, trivial
 from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
@@ -210,7 +211,7 @@ class Part:
                 _core.write_attributes(beside, "info", told)
 
         file.parent.mkdir(parents=True, exist_ok=True)
-        catalog.replace_file(file, copy)
+        replace_file(file, copy)
         stored = {
             f"{form}_file": file.relative_to(self.out).as_posix(),
             f"{form}_sha256": catalog.sha256(file),

@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
+from fclib._files import replace_file, write_text
 from fclib.collections import catalog, trajectory
 from fclib.collections.set_index import folders
 
@@ -96,13 +97,13 @@ def publish(folder: str | Path, site: str | Path) -> list[Path]:
                     entry.external_attr = 0o644 << 16
                     zipped.writestr(entry, (folder / path).read_bytes())
 
-        catalog.replace_file(archive, pack)
+        replace_file(archive, pack)
         written.append(archive)
     catalog.write_catalog(site / catalog.FILE, rows)
     written.append(site / catalog.FILE)
     lines = [f"{path.name} sha256:{catalog.sha256(path)}\n" for path in sorted(written)]
     registry = site / REGISTRY
-    catalog.replace_file(registry, lambda target: target.write_text("".join(lines)))
+    write_text(registry, "".join(lines))
     return [*written, registry]
 
 
@@ -259,7 +260,7 @@ def unpack(archive: Path, folder: Path, family: str) -> None:
                         # a file that is not a catalogue replaces nothing
                         catalog.read_catalog(path)
 
-                catalog.replace_file(target, write)
+                replace_file(target, write)
     except catalog.CatalogError as error:
         raise FetchError(f"{archive}: {family}/{catalog.FILE} is no catalogue: {error}") from None
     # zipfile raises these for an archive that is damaged, encrypted or packed in another way

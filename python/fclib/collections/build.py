@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fclib import _core, _digest, _laws, _solve, scenes
+from fclib._files import write_text
 from fclib._judge import TOLERANCE, trivial
 from fclib._origin import origin_of
 from fclib.collections import catalog, ratings, references, trajectory
@@ -643,8 +644,3 @@ def read_checkpoint(folder: Path, kept: Kept) -> None:
         known = json.loads(path.read_text(encoding="utf-8"))
         kept.looked = known["looked"]
         kept.rows = {row["number"]: row for row in known["rows"]}
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text whole, or leave the old one."""
-    catalog.replace_file(path, lambda beside: beside.write_text(text, encoding="utf-8"))

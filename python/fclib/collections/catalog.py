@@ -11,13 +11,12 @@ import hashlib
 import importlib
 import json
 import operator
-import os
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from fclib import _core
+from fclib._files import replace_file
 from fclib._suggest import suggestion
 
 FILE = "catalog.parquet"
@@ -365,19 +364,6 @@ def lacking(out: Path, rows: Iterable[Mapping[str, Any]]) -> list[str]:
     known = {path for row in rows for path, _ in files_of(row)}
     found = (path.relative_to(out).as_posix() for path in out.glob("*/*/[!.]*.hdf5"))
     return sorted(path for path in found if path not in known)
-
-
-def replace_file(path: Path, write: Any) -> None:
-    """Call `write` with the path of a new file beside `path`, which then takes its place."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(descriptor)
-    beside = Path(name)
-    try:
-        write(beside)
-        beside.chmod(0o644)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def files_of(row: Mapping[str, Any]) -> list[tuple[str, str]]:

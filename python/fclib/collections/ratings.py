@@ -37,6 +37,7 @@ from typing import Any, Final
 import numpy as np
 
 from fclib import _core, _digest, _stored, scenes
+from fclib._files import write_bytes, write_text
 from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, published, references, set_index, trajectory
 
@@ -416,7 +417,7 @@ def accept_proof(path: Path, by: str, name: str | None = None) -> str:
     )
     target = solution_path(row.digest).with_suffix(".json")
     target.parent.mkdir(parents=True, exist_ok=True)
-    catalog.replace_file(target, lambda beside: beside.write_text(text, encoding="utf-8"))
+    write_text(target, text)
     return row.id
 
 
@@ -440,7 +441,7 @@ def store_solution(
     np.savez_compressed(content, origin=json.dumps(dict(finder), sort_keys=True), **arrays)
     path = solution_path(digest)
     path.parent.mkdir(parents=True, exist_ok=True)
-    catalog.replace_file(path, lambda beside: beside.write_bytes(content.getvalue()))
+    write_bytes(path, content.getvalue())
 
 
 def recognised(path: Path, problem: Any) -> str:

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fclib import _core, _digest, scenes
-from fclib.collections import catalog, trajectory
+from fclib._files import write_bytes
+from fclib.collections import trajectory
 from fclib.collections.plan import Plan
 
 if TYPE_CHECKING:
@@ -221,7 +222,7 @@ def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
     content = io.BytesIO()
     np.savez(content, known=json.dumps(known), **arrays)
     path.parent.mkdir(parents=True, exist_ok=True)
-    catalog.replace_file(path, lambda beside: beside.write_bytes(content.getvalue()))
+    write_bytes(path, content.getvalue())
 
 
 def read_checkpoint(path: Path) -> tuple[Recorded, State | None]:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from fclib._files import write_text
 from fclib.bench import comparison, plots, profiles
 from fclib.bench.plots import latex_text
 from fclib.bench.table import Table, object_in
@@ -115,7 +116,7 @@ def write_figure(
         ".bib": "\n\n".join(dict.fromkeys(entry for own in named.values() for entry in own)) + "\n",
     }
     for ending, text in texts.items():
-        path.with_suffix(ending).write_text(text, encoding="utf-8")
+        write_text(path.with_suffix(ending), text)
     return [path, *(path.with_suffix(ending) for ending in texts)]
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fclib._files import write_text
 from fclib.bench.plots import COLOURS
 from fclib.recorders import CRITERIA, Judgement, summary
 
@@ -60,7 +61,7 @@ def write_judged(runs: Mapping[str, Sequence[Judgement]], path: Path) -> None:
         ),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def table_of(rows: Mapping[str, Mapping[str, Any]]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fclib._files import write_text
 from fclib.bench import plots, profiles
 from fclib.bench.comparison import compared
 from fclib.bench.plots import latex_text
@@ -41,9 +42,9 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
         plots.performance(costs, own, FORMATS, words, weigh=WEIGH)
         plots.data(costs, own, FORMATS, per_contact=False, caption=words, weigh=WEIGH)
         plots.data(costs, own, FORMATS, per_contact=True, caption=words, weigh=WEIGH)
-        _write(own / "summary.tex", latex(_shown(profiles.summary(costs, weigh=WEIGH))))
-        _write(own / "families.tex", latex(_shown(profiles.families(costs))))
-        _write(own / "statuses.tex", latex(_shown(profiles.failures(campaigns.at(tol)))))
+        write_text(own / "summary.tex", latex(_shown(profiles.summary(costs, weigh=WEIGH))))
+        write_text(own / "families.tex", latex(_shown(profiles.families(costs))))
+        write_text(own / "statuses.tex", latex(_shown(profiles.failures(campaigns.at(tol)))))
         written |= set(own.iterdir())
     if len(whole.tolerances) > 1:
         points = profiles.work_precision(campaigns.rows, whole, weigh=WEIGH)
@@ -82,9 +83,3 @@ def _cell(value: Any) -> str:
         mantissa, e, exponent = text.partition("e")
         return rf"${mantissa}\cdot 10^{{{int(exponent)}}}$" if e else text
     return latex_text(str(value))
-
-
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Mapping
-from errno import EISDIR
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
 from fclib import _core, _laws
+from fclib._files import write_bytes
 from fclib.report.libraries import libraries
 from fclib.report.network import Network, network_of
 from fclib.report.solids import record_of, solids_of
@@ -272,12 +271,5 @@ def write_view(
         "/*SCRIPTS*/": "\n".join(elements),
     }.items():
         page = page.replace(mark, text)
-    if path.is_dir():
-        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
-    part = path.with_name(f".{path.name}.part")
-    try:
-        # the name of a file may not be valid text
-        part.write_text(page, encoding="utf-8", errors="replace")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    # the name of a file may not be valid text
+    write_bytes(path, page.encode(errors="replace"))

@@ -8,6 +8,8 @@ solutions of a sample: the columns of `VECTORS`, doubles in little endian.
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import math
 import re
@@ -19,11 +21,12 @@ from typing import Any, Final
 import numpy as np
 
 from fclib import _core
+from fclib._files import write_bytes
 from fclib._verdicts import is_solved
 from fclib.bench.layout import CAMPAIGN, HISTORY, columns
 from fclib.bench.store import LONG, Store
 from fclib.bench.table import TEXTS, WHOLE
-from fclib.collections.catalog import arrow, replace_file, sha256
+from fclib.collections.catalog import arrow, sha256
 
 ABOUT: Final = b"fclib.results"  # key of the metadata
 VERSION: Final = 1
@@ -202,10 +205,11 @@ def pack(
     columns = types() | (dict.fromkeys(VECTORS, pa.binary()) if solutions else {})
     table = pa.Table.from_pylist(rows, schema=pa.schema(list(columns.items()), metadata=metadata))
     where.mkdir(parents=True, exist_ok=True)
-    part = where / f".{name}.part"
-    replace_file(part, lambda beside: pa.parquet.write_table(table, beside, compression="zstd"))
-    path = where / f"{name}-{sha256(part)[:DIGITS]}.parquet"
-    part.replace(path)
+    content = io.BytesIO()
+    pa.parquet.write_table(table, content, compression="zstd")
+    digest = hashlib.sha256(content.getbuffer()).hexdigest()
+    path = where / f"{name}-{digest[:DIGITS]}.parquet"
+    write_bytes(path, content.getvalue())
     return path
 
 

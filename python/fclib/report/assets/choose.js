@@ -78,7 +78,7 @@
         `chance of ${Math.round(100 * low)} to ${Math.round(100 * high)} %. Its mean CPU time ` +
         `is ${number(best.mean)} s, where a failure counts ` +
         `${charge === "1" ? "as" : `${charge} times`} the limit.`,
-      ...(second
+      ...(second && second.solved > 0
         ? [
             " The second is ",
             solverLink(name(second)),

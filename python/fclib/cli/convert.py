@@ -57,10 +57,13 @@ class Request:
 
 def format_of(path: Path) -> Format:
     """The format of a file that is there: its first bytes decide, or else its name."""
+    file = _sequence.place_of(path)[0]
     try:
-        with _sequence.place_of(path)[0].open("rb") as file:
-            if file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
-                return Format.hdf5
+        # to open a pipe waits for ever
+        if file.is_file():
+            with file.open("rb") as stream:
+                if stream.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
+                    return Format.hdf5
     except OSError:
         pass  # reading it will report the fault
     return EXTENSIONS.get(path.suffix.lower(), Format.siconos)

@@ -66,7 +66,7 @@ TEST(ColouredSweeps, velocities_are_those_of_w) {
   testing::RandomData random(3);
   ReducedProblem problem{.W = random_matrix<3>(5, 0.005),
                          .q = random.vector(900),
-                         .friction = {Vector::Constant(300, 0.5), Vector()}};
+                         .friction = {Vector::Constant(300, 0.5), {}, {}}};
   const Vector r = random.vector(900);
   Vector expected(900), u(900);
   problem.velocity(r, expected);
@@ -80,7 +80,7 @@ TEST(ColouredSweeps, velocities_are_those_of_w) {
 TEST(ColouredSweeps, a_sweep_visits_each_contact_once_forwards_and_backwards) {
   ReducedProblem problem{.W = random_matrix<3>(9, 0.001),
                          .q = Vector::Zero(900),
-                         .friction = {Vector::Constant(300, 0.5), Vector()}};
+                         .friction = {Vector::Constant(300, 0.5), {}, {}}};
   ColouredSweeps<Coulomb<3>> sweeps(problem, 1, 1);  // one thread: the order can be kept
   std::vector<Index> forwards, backwards;
   sweeps.sweep([&](Index a) { forwards.push_back(a); });

@@ -115,7 +115,7 @@ TEST(OwnUnits, what_nothing_moves_has_the_usual_unit) {
     const Eigen::MatrixXd W = Vector{{4, 4, left, left}}.asDiagonal();
     ReducedProblem problem{.W = {Matrix::from_eigen(SparseColumns(W.sparseView())), 2},
                            .q = Vector{{-1, 0, 1, 0}},
-                           .friction = {Vector::Ones(2), {}}};
+                           .friction = {Vector::Ones(2), {}, {}}};
     EXPECT_EQ(OwnUnits(problem).to_own(Vector::Ones(4)), Vector::Constant(4, 4));
     problem.q.setZero();
     EXPECT_TRUE(OwnUnits(problem).q().isZero(0));

@@ -789,6 +789,24 @@ def test_a_set_that_is_built_in_part_says_so(monkeypatch: pytest.MonkeyPatch) ->
     assert said == []
 
 
+def test_a_sample_of_a_family_is_built_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path / "collection"))
+    name, settings = "rt444/KaplasTower", {"solvers": ["auto"], "tolerances": [1e-4]}
+    plan = campaign(problems=[{"set": name, "sample": 4}], **settings).plan()
+    names = [job.problem.name for job in plan]
+    assert sorted(names) == [f"KaplasTower/{k:04d}-global" for k in (0, 67, 133, 200)]
+    assert len(list(tmp_path.rglob("*-global.hdf5"))) == 4
+    assert not (tmp_path / "collection").exists()
+    # those that a sample of the whole family takes
+    numbers = [Path(f"{k:04d}") for k in range(201)]
+    assert [path.name for path in problems.sample(numbers, 4)] == ["0000", "0067", "0133", "0200"]
+
+
 def test_files_of_a_set_that_is_not_built_name_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

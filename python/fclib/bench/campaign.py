@@ -392,7 +392,8 @@ class Campaign:
             steps = group.sequence
             paths += generated.stored(group.set, group.form, steps.start, steps.count, steps.stride)
         elif group.set:
-            paths += problems.of_set(group.set, group.form, tell)
+            part = generated.sampled(group.set, group.form, group.sample, tell)
+            paths += part or problems.of_set(group.set, group.form, tell)
         if group.simulate is not None:
             paths += generated.simulated(
                 family=group.simulate["family"],

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
-from fclib.bench.problems import SUFFIXES
+from fclib.bench.problems import SUFFIXES, now_and_then
 
 
 def cache_folder() -> Path:
@@ -147,6 +147,47 @@ def stored(name: str, form: str | None, start: int, count: int | None, stride: i
             _core.write(folder / own, problem)
 
     return files_of(recipe, make)
+
+
+def sampled(
+    name: str, form: str | None, count: int | None, tell: Callable[[str], None]
+) -> list[Path]:
+    """Some problems of a family of the collection, as `problems.sample` takes them, built alone.
+
+    Empty if it is there or can be fetched, if no
+    states of it are stored, and if it has no more problems than these.
+
+    Args:
+        name: SET/FAMILY; nothing else is sampled here.
+        form: "global" or "local", of problems that have both.
+        count: how many; None: all.
+        tell: called with the progress of the build.
+
+    Raises:
+        ImportError: MuJoCo or pyarrow is not there.
+        OSError, fclib.Error: the files cannot be written.
+    """
+    from fclib.collections import library, set_index
+    from fclib.collections.build import build
+
+    if count is None or count < 2 or os.environ.get(library.SOURCE):
+        return []
+    try:
+        found = library.Collection(name)
+    except KeyError:
+        return []  # problems.of_set says what there is
+    if len(found.folders) != 1 or library.is_there(found.folders[0], found.folder):
+        return []
+    plan = set_index.plan_of(found.folders[0])
+    if plan.trajectory is None or plan.chosen is not None or count >= plan.total:
+        return []
+    plan = dataclasses.replace(plan, count=count)
+    digest = hashlib.sha256(plan.fingerprint().encode()).hexdigest()[:16]
+    folder = cache_folder() / "samples" / digest
+    progress = now_and_then(f"a sample of {count}", tell)
+    build([plan], folder, pictures=False, progress=progress)
+    part = library.Collection(name, folder)
+    return [part.path(k, form).resolve() for k in range(len(part))]
 
 
 def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:

@@ -118,7 +118,9 @@ def of_set(
                 f" On several cores: fclib collection build {name} --out {found.folder}"
             )
         for k, own in enumerate(absent):
-            library.ensure(own, found.folder, _now_and_then(f"{k + 1} of {len(absent)}", tell))
+            library.ensure(
+                own, found.folder, now_and_then(f"family {k + 1} of {len(absent)}", tell)
+            )
         if absent:
             tell(f"set {name}: built")
         return [found.path(k, form).resolve() for k in range(len(found))]
@@ -127,7 +129,7 @@ def of_set(
         raise _core.Error(f"set {name}: {word}") from None
 
 
-def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
+def now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
     """Tells the progress of a family's build: at its beginning, and every `PATIENCE` seconds."""
     last_told = -PATIENCE
 
@@ -135,7 +137,7 @@ def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int
         nonlocal last_told
         if time.monotonic() - last_told >= PATIENCE:
             last_told = time.monotonic()
-            tell(f"family {which}: {name}, {done} of {total} problems")
+            tell(f"{which}: {name}, {done} of {total} problems")
 
     return show
 

@@ -803,8 +803,11 @@ def test_a_sample_of_a_family_is_built_alone(
     assert len(list(tmp_path.rglob("*-global.hdf5"))) == 4
     assert not (tmp_path / "collection").exists()
     # those that a sample of the whole family takes
-    numbers = [Path(f"{k:04d}") for k in range(201)]
-    assert [path.name for path in problems.sample(numbers, 4)] == ["0000", "0067", "0133", "0200"]
+    assert problems.sample(list(range(201)), 4) == [0, 67, 133, 200]
+    # also of a family whose problems were chosen
+    plan = campaign(problems=[{"set": "decks/ElasticCubes", "sample": 1}], **settings).plan()
+    assert [job.problem.nc > 0 for job in plan] == [True]
+    assert len(list(tmp_path.rglob("*-global.hdf5"))) == 5
 
 
 def test_files_of_a_set_that_is_not_built_name_the_command(

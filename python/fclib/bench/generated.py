@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
-from fclib.bench.problems import SUFFIXES, now_and_then
+from fclib.bench.problems import SUFFIXES, now_and_then, sample
 
 
 def cache_folder() -> Path:
@@ -170,7 +170,7 @@ def sampled(
     from fclib.collections import library, set_index
     from fclib.collections.build import build
 
-    if count is None or count < 2 or os.environ.get(library.SOURCE):
+    if count is None or os.environ.get(library.SOURCE):
         return []
     try:
         found = library.Collection(name)
@@ -179,9 +179,10 @@ def sampled(
     if len(found.folders) != 1 or library.is_there(found.folders[0], found.folder):
         return []
     plan = set_index.plan_of(found.folders[0])
-    if plan.trajectory is None or plan.chosen is not None or count >= plan.total:
+    numbers = plan.numbers().tolist()
+    if plan.trajectory is None or count >= len(numbers):
         return []
-    plan = dataclasses.replace(plan, count=count)
+    plan = plan.only(sample(numbers, count))
     digest = hashlib.sha256(plan.fingerprint().encode()).hexdigest()[:16]
     folder = cache_folder() / "samples" / digest
     progress = now_and_then(f"a sample of {count}", tell)

@@ -7,13 +7,15 @@ import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from fclib import _core, _digest, _sequence
 from fclib._origin import origin_of
 from fclib.bench.job import ProblemFacts
+
+T = TypeVar("T")
 
 SUFFIXES = (".hdf5", ".h5")
 FORM = re.compile(r"(.+)-(global|local)")  # the stem of a file with one form of a problem
@@ -162,13 +164,13 @@ def _glob(path: Path) -> Iterator[Path]:
     return folder.glob(str(Path(*parts[fixed:]))) if fixed < len(parts) else iter(())
 
 
-def sample(paths: list[Path], count: int | None) -> list[Path]:
-    """So many of the paths, spread evenly; one is the middle one. Without a count: all."""
-    if count is None or count >= len(paths):
-        return paths
-    first = 0 if count > 1 else (len(paths) - 1) / 2
-    chosen = np.linspace(first, len(paths) - 1, count).round().astype(int)
-    return [paths[k] for k in chosen]
+def sample(items: list[T], count: int | None) -> list[T]:
+    """So many of the items, spread evenly; one is the middle one. Without a count: all."""
+    if count is None or count >= len(items):
+        return items
+    first = 0 if count > 1 else (len(items) - 1) / 2
+    chosen = np.linspace(first, len(items) - 1, count).round().astype(int)
+    return [items[k] for k in chosen]
 
 
 def look(path: Path, family: str = "") -> ProblemFacts:

@@ -76,12 +76,10 @@ static void solving(void) {
         !fclib_options_set_array(o, "guess", reactions, -1));
   CHECK(fclib_options_set_array(o, "gues", reactions, 6) && !fclib_solve_local_with(&a, o));
   fclib_options_delete(o);
-  const char* wrong[][3] = {{"tolerance", "-1", "outside"},
-                            {"tolerance", "inf", "finite"},
-                            {"tolerance", "small", "not a number"},
-                            {"merit", "mine", "both, natural"},
-                            {"solver", "no_such", "no_such"},
-                            {"tolerence", "1", "tolerence"}};
+  const char* wrong[][3] = {
+      {"tolerance", "-1", "outside"},         {"tolerance", "inf", "finite"},
+      {"tolerance", "small", "not a number"}, {"merit", "mine", "both, natural"},
+      {"solver", "no_such", "no_such"},       {"tolerence", "1", "tolerence"}};
   for (unsigned k = 0; k < sizeof wrong / sizeof *wrong; k++) {
     o = fclib_options_create();
     CHECK(fclib_options_set_text(o, wrong[k][0], wrong[k][1]) && !fclib_solve_local_with(&a, o));

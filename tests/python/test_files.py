@@ -31,9 +31,9 @@ def test_an_error_names_the_file_and_not_its_part(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as caught:
         _files.write_text(tmp_path / "no" / "page.html", "")
     assert caught.value.filename == str(tmp_path / "no" / "page.html")
-    with pytest.raises(IsADirectoryError) as caught:
+    with pytest.raises(IsADirectoryError) as folder:
         _files.write_text(tmp_path, "")
-    assert caught.value.filename == str(tmp_path)
+    assert folder.value.filename == str(tmp_path)
     assert not list(tmp_path.iterdir())
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,12 @@ from typing import Any
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Call `write` with the path of a new file beside `path`, which then takes its place.
 
-    What is no plain file, such as /dev/stdout, is written as it is. OSError, which names `path`.
+    What is no plain file, such as /dev/stdout, is written as it is; but a pipe that nothing reads
+    would wait for ever. OSError, which names `path`.
     """
     if path.exists() and not path.is_file():
-        write(path)
+        with _held(path):
+            write(path)
         return
     beside = None
     try:
@@ -33,6 +37,24 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     finally:
         if beside is not None:
             beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def _held(path: Path) -> Iterator[None]:
+    """Keep a pipe open, so that its reader stays. OSError if there is none."""
+    if not path.is_fifo():
+        yield
+        return
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        raise OSError(errno.ENXIO, "is a pipe that nothing reads", str(path)) from None
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def write_bytes(path: Path, content: bytes) -> None:

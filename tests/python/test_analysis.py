@@ -592,6 +592,24 @@ def test_without_a_solution_nothing_is_unique() -> None:
         assert found.self_stress.verdict != analysis.SOLVABLE
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e-170, 1e170, 1e300])
+def test_velocities_whose_squares_no_double_holds_are_analysed(size: float) -> None:
+    found = analysis.analyze(local_problem(np.eye(3), [-size, 0.5 * size, 0], [0.3]), time_limit=1)
+    assert found.existence.verdict == analysis.EXISTS_SLATER
+    assert found.units.velocity == pytest.approx(size * np.sqrt(1.25 / 3))
+    assert any(line.startswith("velocities of") for line in found.units.trouble)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_contact_whose_W_no_double_holds_is_refused() -> None:
+    problem = fclib.GlobalProblem(
+        M=np.eye(3), H=1e160 * np.eye(3), f=np.zeros(3), w=[-1.0, 0.7, 0], mu=[0.5]
+    )
+    with pytest.raises(fclib.ProblemError, match="not a finite number"):
+        analysis.analyze(problem, time_limit=1)
+
+
 def test_friction_whose_square_overflows_is_analysed() -> None:
     problem = local_problem(np.eye(3), [-1, 1, 0], [1e300])
     found = analysis.analyze(problem)

@@ -539,21 +539,87 @@ def half_a_minute() -> Iterator[None]:
         ("info", "PIPE"),
         ("convert", "PIPE", "new.hdf5"),
         ("record", "mujoco", "PIPE"),
+        ("bench", "--problems", "PROBLEM", "--solver", "nsgs", "--module", "MODULE"),
+        ("bench", "--problems", "PROBLEM", "--solver", "nsgs", "--tol", "1e-4", "--store", "PIPE"),
+        ("results", "unpack", "PIPE"),
+        ("results", "verify", "PIPE"),
+        ("results", "verify", "PART"),
+        ("profile", "--with", "PIPE"),
+        ("collection", "verify", "PIPE"),
+        ("collection", "find", "nc > 0", "--in", "PIPE"),
+        ("view", "PROBLEM", "--out", "PIPE"),
     ],
 )
 def test_what_may_have_no_end_is_no_file(
     words: tuple[str, ...], tmp_path: Path, files: list[Path], half_a_minute: None
 ) -> None:
     pipe, scene = tmp_path / "pipe.csv", tmp_path / "scene.xml"
-    os.mkfifo(pipe)
+    part, module = tmp_path / "part-0123456789abcdef.parquet", tmp_path / "endless.py"
+    for path in (pipe, part, module):
+        os.mkfifo(path)
     scene.write_text(
         "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'><freejoint/>"
         "<geom size='.1'/></body></worldbody></mujoco>"
     )
-    names = {"PIPE": pipe, "SCENE": scene, "PROBLEM": files[0]}
+    names = {"PIPE": pipe, "PART": part, "MODULE": module, "SCENE": scene, "PROBLEM": files[0]}
     done = run(*(re.sub("[A-Z]{4,}", lambda name: str(names[name[0]]), word) for word in words))
     assert done.returncode in (1, 2), done.stdout
-    assert re.search("no(t a)? regular file|there is no such script", " ".join(done.stderr.split()))
+    said = " ".join(done.stderr.split())
+    assert re.search("no(t a)? regular file|there is no such script|nothing reads", said)
+
+
+def test_what_reads_a_pipe_gets_what_a_command_writes(
+    tmp_path: Path, files: list[Path], half_a_minute: None
+) -> None:
+    pipe, page = tmp_path / "pipe", tmp_path / "page.html"
+    os.mkfifo(pipe)
+    with page.open("wb") as stream, subprocess.Popen(["cat", pipe], stdout=stream) as reader:
+        for _ in range(100):  # until it has opened the pipe
+            done = run("view", files[0], "--out", pipe)
+            if "nothing reads" not in done.stderr:
+                break
+        assert done.returncode == 0, done.stderr
+        assert reader.wait(30) == 0
+    assert page.read_text(encoding="utf-8").rstrip().endswith("</html>")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("bench", "--problems", "FOLDER", "--solver", "nsgs", "--tol", "1e-4", "--store", "OUT"),
+        ("bench", "--problems", "PROBLEM", "--solver", "nsgs", "--module", "LOOP"),
+        ("collection", "add", "LOOP", "--out", "OUT"),
+        ("collection", "add", "FOLDER", "--out", "LOOP"),
+        ("report", "--catalog", "tiny", "--out", "LOOP"),
+    ],
+)
+def test_a_link_to_itself_is_one_line(
+    words: tuple[str, ...], tmp_path: Path, files: list[Path]
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    loop = folder / "loop.h5"
+    loop.symlink_to(loop)
+    names = {"LOOP": loop, "FOLDER": folder, "PROBLEM": files[0], "OUT": tmp_path / "out"}
+    done = run(*(re.sub("[A-Z]{3,}", lambda name: str(names[name[0]]), word) for word in words))
+    assert done.returncode in (1, 2)
+    assert str(folder) in "".join(done.stderr.split("\n"))
+    assert "loop.h5-" not in done.stderr  # a folder that only the command knows
+    assert list(folder.iterdir()) == [loop]
+
+
+def test_an_output_folder_that_is_a_file_is_named(files: list[Path]) -> None:
+    done = run("convert", files[0], "--out", files[1])
+    assert done.returncode == 2
+    assert f"{files[1]} is no folder" in " ".join(done.stderr.split())
+
+
+def test_a_part_that_cannot_be_read_is_named_once(tmp_path: Path) -> None:
+    empty = tmp_path / "empty.parquet"
+    empty.touch()
+    done = run("results", "verify", empty)
+    assert done.returncode == 1
+    assert done.stderr.count(str(empty)) == 1
 
 
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:

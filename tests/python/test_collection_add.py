@@ -180,3 +180,17 @@ def test_what_cannot_be_added_is_one_line(
     )
     assert result.exit_code in (1, 2)
     assert words in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_a_name_that_no_catalogue_holds_is_left_out(source: Path, tmp_path: Path) -> None:
+    found = sorted(source.rglob("*.hdf5"))
+    try:
+        shutil.copy(found[0], bytes(source) + b"/\xff.hdf5")
+    except OSError:
+        pytest.skip("the file system has names in UTF-8 alone")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["collection", "add", str(source), "--out", str(out)])
+    assert result.exit_code == 1
+    assert "its name is not UTF-8" in " ".join(result.stderr.split())
+    rows = catalog.read_catalog(out).to_pylist()
+    assert found[0].relative_to(source).as_posix() in {row["source"] for row in rows}

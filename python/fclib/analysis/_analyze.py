@@ -23,6 +23,7 @@ from fclib.analysis._data import (
     asymmetry,
     balanced,
     columns,
+    norm,
 )
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import PROVEN_NOT, Existence, Slater, existence, slater
@@ -267,6 +268,8 @@ class Analysis:
         return result
 
 
+# what overflows is not finite, and decides nothing
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def analyze(
     problem: _solve.Problem,
     *,
@@ -497,7 +500,7 @@ def _units(data: Data, verdict: Existence) -> Units:
     trace = data.W.diagonal().reshape(nc, d).sum(axis=1)
     mean = data.stiffness
     mass = 1 / mean
-    velocity = float(np.sqrt(np.mean(data.local.q**2)))
+    velocity = norm(data.local.q) / float(np.sqrt(data.problem.m))
     held = trace[trace > 0]
     ratio = float(held.max() / held.min()) if held.size else float("nan")
     prestress = float("nan")

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from math import ceil, gcd
+from math import ceil, gcd, isfinite
 
 import numpy as np
 
@@ -181,7 +181,14 @@ def _robust(
     part of u_T across must be wrong there, by more than its change in the cell, by rounding and by
     the change of q.
     """
-    A, b, m = np.array(W, dtype=float), np.array(q, dtype=float), float(mu)
+    speed = max(map(abs, q))
+    if not speed or not isfinite(change):
+        return False
+    # in units of its own, the problem has no numbers that are too large for doubles
+    size_of_W = max(abs(value) for row in W for value in row)
+    A = np.array([[float(value / size_of_W) for value in row] for row in W])
+    b, m = np.array([float(value / speed) for value in q]), float(mu)
+    change = float(Fraction(change) / speed)
     if abs(b[0]) <= 2 * change or np.linalg.cond(A) > REGULAR:
         return False
     inverse = np.linalg.inv(A)
@@ -204,7 +211,8 @@ def _robust(
     up = np.sign(b[0])
     wrong = (up * D - size * half > 0) | (up * S + wide < 0) | (abs(P) - wide > 0)
     for point in points:
-        way = -np.array(point.u[1:], dtype=float)
+        most = max(map(abs, point.u[1:])) or Fraction(1)
+        way = -np.array([float(value / most) for value in point.u[1:]])
         if point.state == "slide" and way.any():
             wrong |= way / np.linalg.norm(way) @ e > NEAR
     return bool(wrong.all())

@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
-from fclib._regular import regular
+from fclib._regular import regular, resolved
 from fclib._solve import MeritKind
 from fclib._suggest import suggestion
 from fclib.bench import generated, problems
@@ -187,7 +187,7 @@ class Campaign:
         """
         base = base or Path.cwd()
         _only(entries, KNOWN, "")
-        modules = tuple(str((base / m).resolve()) for m in _texts(entries, "modules"))
+        modules = tuple(str(resolved(base / m)) for m in _texts(entries, "modules"))
         try:
             load_modules(list(modules))
         except _registry.SolverError as error:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from fclib import _registry
+from fclib._regular import regular
 
 _loaded: dict[str, str] = {}  # the files of those that are imported, by their names
 
@@ -32,6 +33,7 @@ def load_modules(paths: list[str]) -> None:
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         try:
+            regular(path)  # to read a pipe waits for ever
             spec.loader.exec_module(module)
         except Exception as error:
             del sys.modules[name]

@@ -13,6 +13,7 @@ import numpy as np
 
 from fclib import _core, _digest, _sequence
 from fclib._origin import origin_of
+from fclib._regular import resolved
 from fclib.bench.job import ProblemFacts
 
 T = TypeVar("T")
@@ -57,7 +58,7 @@ def files_of(
             raise _core.FileError(
                 f"{path}: there is no such file, and none in such a folder{_how_to_have(path)}"
             )
-        for match in sorted(match.resolve() for match in matches):
+        for match in sorted(map(resolved, matches)):
             for one in _sequence.expanded(match):
                 found[one] = path.is_file() or found.get(one, False)
     if form == "both":

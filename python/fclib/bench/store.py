@@ -218,6 +218,8 @@ class Store:
             raise StoreError(f"{self.path}: there is no such store")
         if self.path.is_dir():
             raise StoreError(f"{self.path}: is a folder, and no store")
+        if self.path.exists() and not self.path.is_file():
+            raise StoreError(f"{self.path}: is no regular file, and no store")
         if not self.path.parent.is_dir():
             raise StoreError(f"{self.path}: there is no folder {self.path.parent}")
         self._ids: dict[str, dict[str, int]] = {}

@@ -196,7 +196,7 @@ def parse_options(pairs: Sequence[str]) -> dict[str, str]:
             try:
                 options[name] = regular(value[1:]).read_text(encoding="utf-8")
             except (OSError, UnicodeDecodeError) as error:
-                raise typer.BadParameter(f"'{pair}': {error}") from error
+                raise typer.BadParameter(f"'{pair}': {words_of(error)}") from error
     return options
 
 

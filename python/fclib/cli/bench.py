@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 import fclib
 from fclib import bench
+from fclib._regular import resolved
 from fclib._verdicts import is_solved
 from fclib.bench import machine
 from fclib.bench.campaign import SET
@@ -165,7 +166,7 @@ def run(
         "repeats": repeats,
         "history": history or None,
         "budget": budget,
-        "modules": module and [str(Path(path).resolve()) for path in module],
+        "modules": module and [str(resolved(path)) for path in module],
     }
     flags = {name: value for name, value in flags.items() if value not in (None, [])}
     try:

@@ -15,7 +15,7 @@ import typer
 import fclib
 from fclib import collections
 from fclib._judge import TOLERANCE
-from fclib._regular import regular
+from fclib._regular import reason_of, regular, resolved
 from fclib._verdicts import CLASSES
 from fclib.cli._build import (
     Analyze,
@@ -49,7 +49,7 @@ from fclib.collections.set_index import SETS, choices, distinct_of, kind_of, pro
 from fclib.collections.verify import LACKING
 
 app = typer.Typer(
-    help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
+    help="Families of problems: list, build, verify, publish, get.", no_args_is_help=True
 )
 
 MOST_COPIES = 10  # largest number of copies named; the catalogue has all
@@ -73,7 +73,7 @@ def named(names: list[str] | None, path: Path | None) -> list[str]:
         try:
             lines = regular(path).read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeError) as error:
-            fail(f"{path}: cannot be read as a list of names: {error}")
+            fail(f"{path}: cannot be read as a list of names: {reason_of(error)}")
         found += [line.strip() for line in lines if line.strip() and line.strip()[0] != "#"]
         if not found:
             fail(f"{path}: names nothing")
@@ -674,7 +674,7 @@ def add(
         license=license_,
         citation=citation,
     )
-    mine = collections.plain(name or source.resolve().name)
+    mine = collections.plain(name or resolved(source).name)
     try:
         with many_bars() as bars:
             refused = collections.add(source, folder, mine, rules, bars)

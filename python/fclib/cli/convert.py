@@ -210,6 +210,8 @@ def targets_of(
         ValueError: the arguments do not say what to write.
     """
     if out_dir is not None:
+        if out_dir.exists() and not out_dir.is_dir():
+            raise ValueError(f"{out_dir} is no folder")
         output = output or Format.hdf5
         files = [path for file in files for path in _sequence.steps_or_file(file)]
         targets = [out_dir / (_sequence.name_of(path) + EXTENSION_OF[output]) for path in files]

@@ -15,7 +15,7 @@ import typer
 import fclib
 from fclib._files import write_csv
 from fclib._sequence import SUFFIXES, steps_or_file
-from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error
+from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error, words_of
 
 
 def command(
@@ -72,7 +72,7 @@ def command(
     except ImportError as error:
         fail(f"{error}; install it with: pip install 'fclib[report]'")
     except OSError as error:
-        fail(str(error))
+        fail(words_of(error))
     if as_json:
         return
     columns = [name for name in rows[0] if name != "run"]

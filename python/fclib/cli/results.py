@@ -125,7 +125,7 @@ def verify(
                     if row["status"] == "wrong"
                 ]
         except (ImportError, fclib.Error) as error:
-            wrong = [str(error)]
+            wrong = [str(error).removeprefix(f"{path}: ")]
         report.add({**record, "status": "wrong" if wrong else "ok"}, not wrong)
         for word in wrong[:10]:
             err.print(f"fclib: {path}: {word}", style="red", highlight=False)

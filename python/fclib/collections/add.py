@@ -23,6 +23,7 @@ from typing import Any
 from fclib import _core, _sequence
 from fclib._files import replace_file
 from fclib._judge import MARK, TOLERANCE, judge, trivial
+from fclib._regular import resolved
 from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
@@ -78,7 +79,7 @@ def add(
         OSError: the collection cannot be written.
     """
     catalog.arrow()
-    source, out = Path(source).resolve(), Path(out).resolve()
+    source, out = resolved(source), resolved(out)
     if not source.is_dir():
         raise NotADirectoryError(f"{source}: is no folder")
     collection = plain(name or source.name)
@@ -165,7 +166,12 @@ class Part:
         catalog.write_catalog(self.catalogue, self.rows.values())
 
     def _add_file(self, path: Path) -> None:
-        key = path.relative_to(self.source).as_posix(), _sha256(path)
+        own = path.relative_to(self.source).as_posix()
+        try:
+            own.encode()
+        except UnicodeEncodeError:
+            raise _core.FileError(f"{path}: its name is not UTF-8, which a catalogue has") from None
+        key = own, _sha256(path)
         row = self.rows.get(key)
         if row is not None and all(
             (self.out / file).is_file() and catalog.sha256(self.out / file) == digest

@@ -198,7 +198,7 @@ def download(url: str, target: Path, progress: Callable[[int, int], None] | None
         try:
             shutil.copyfile(path, target)
         except OSError as error:
-            raise FetchError(f"{path}: cannot be fetched: {error.strerror}") from None
+            raise FetchError(f"{path}: cannot be fetched: {error.strerror or error}") from None
         return
     requests = importlib.import_module("requests")
     reason: object = None

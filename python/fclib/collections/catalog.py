@@ -17,6 +17,7 @@ from typing import Any
 
 from fclib import _core
 from fclib._files import replace_file
+from fclib._regular import reason_of, regular
 from fclib._suggest import suggestion
 
 FILE = "catalog.parquet"
@@ -158,13 +159,13 @@ def read_catalog(path: str | Path) -> Any:
     file = path / FILE if path.is_dir() else path
     try:
         # read it as one file, not as a data set: names of folders are not columns
-        table = pa.parquet.ParquetFile(file).read()
+        table = pa.parquet.ParquetFile(regular(file)).read()
     except FileNotFoundError:
         raise CatalogError(
             f"{file}: there is no catalogue; make one with fclib collection build --out {path}"
         ) from None
     except (OSError, pa.ArrowInvalid) as error:
-        reason = str(error).splitlines()[0]
+        reason = reason_of(error)
         raise CatalogError(f"{file}: cannot be read as a catalogue: {reason}") from None
     for name in ("id", "digest", *FILES):
         if name not in table.column_names:

@@ -196,6 +196,8 @@ def build_site(
     """
     if campaigns is None and catalogue is None:
         raise ReportError("a report needs a store, a catalogue, or both")
+    if out.is_symlink() and not out.exists():
+        raise ReportError(f"{out}: is a link, and there is nothing where it leads")
     if out.exists() and not (out / MARK).is_file() and (not out.is_dir() or any(out.iterdir())):
         raise ReportError(f"{out}: is there, and is no site that fclib report has made")
     if module is not None and not with_files:

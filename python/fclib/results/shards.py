@@ -22,6 +22,7 @@ import numpy as np
 
 from fclib import _core
 from fclib._files import write_bytes
+from fclib._regular import reason_of, regular
 from fclib._verdicts import is_solved
 from fclib.bench.layout import CAMPAIGN, HISTORY, columns
 from fclib.bench.store import LONG, Store
@@ -80,7 +81,7 @@ def look(path: Path) -> Shard:
     """
     pa = arrow()
     try:
-        file = pa.parquet.ParquetFile(path)
+        file = pa.parquet.ParquetFile(regular(path))
         _require_columns(path, file.schema_arrow)
         about = json.loads((file.schema_arrow.metadata or {})[ABOUT])
         found = PART.fullmatch(path.name)
@@ -91,7 +92,7 @@ def look(path: Path) -> Shard:
         campaigns = [dict(one) for one in about["campaigns"]]
         return Shard(path, name, file.metadata.num_rows, machines, campaigns)
     except (OSError, pa.ArrowException) as error:
-        reason = str(error).splitlines()[0]
+        reason = reason_of(error)
         raise ShardError(f"{path}: cannot be read as published runs: {reason}") from None
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, ShardError):
@@ -252,11 +253,11 @@ def rows_of(path: Path, chosen: Sequence[str] | None = None) -> Iterator[dict[st
     """The rows of a part, one after another. ShardError if one cannot be read."""
     pa = arrow()
     try:
-        file = pa.parquet.ParquetFile(path)
+        file = pa.parquet.ParquetFile(regular(path))
         for batch in file.iter_batches(columns=list(chosen) if chosen else None):
             yield from batch.to_pylist()
     except (OSError, pa.ArrowException) as error:
-        reason = str(error).splitlines()[0]
+        reason = reason_of(error)
         raise ShardError(f"{path}: cannot be read as published runs: {reason}") from None
 
 
@@ -266,13 +267,13 @@ def verify(path: Path) -> list[str]:
     Raises:
         ShardError: it cannot be read at all.
     """
+    own = look(path)
     found = PART.fullmatch(path.name)
     wrong = []
     if found is None:
         wrong.append("the name is not NAME-DIGEST.parquet")
     elif sha256(path)[:DIGITS] != found[2]:
         wrong.append(f"the content is {sha256(path)[:DIGITS]}, and the name says {found[2]}")
-    own = look(path)
     if not own.runs:
         wrong.append("it has no run")
     keys: set[tuple[str, str]] = set()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fclib._regular import regular
+from fclib._regular import regular, resolved
 from fclib.simulate.simulation import Control, State
 
 FILES = (".csv", ".npy")
@@ -67,7 +67,7 @@ def policy_of(name: str) -> Control:
         raise ValueError(f"{name!r}: is no MODULE:FUNCTION, and no .csv or .npy file")
     folder = Path.cwd()
     if module.endswith(".py"):
-        file = Path(module).resolve()
+        file = resolved(module)
         if not file.is_file():
             raise ValueError(f"{name!r}: the module cannot be imported: there is no file {file}")
         folder, module = file.parent, file.stem

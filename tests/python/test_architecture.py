@@ -107,6 +107,7 @@ PYTHON: dict[str, set[str]] = {
     "simulate": {"_core", "_geometry", "_laws", "_origin", "_regular", "_solve", "scenes"},
     "recorders": {"_core", "_laws", "_origin", "_sequence", "_solve", "external", "scenes"},
     "collections": {
+        "_regular",
         "_files",
         "_laws",
         "_core",
@@ -145,6 +146,7 @@ PYTHON: dict[str, set[str]] = {
         "collections",
     },
     "results": {
+        "_regular",
         "_files",
         "_core",
         "_verdicts",

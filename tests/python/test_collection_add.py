@@ -1,5 +1,6 @@
 """Files that are already there, taken into a collection as a set like any other."""
 
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -185,7 +186,7 @@ def test_what_cannot_be_added_is_one_line(
 def test_a_name_that_no_catalogue_holds_is_left_out(source: Path, tmp_path: Path) -> None:
     found = sorted(source.rglob("*.hdf5"))
     try:
-        shutil.copy(found[0], bytes(source) + b"/\xff.hdf5")
+        shutil.copy(found[0], source / os.fsdecode(b"\xff.hdf5"))
     except OSError:
         pytest.skip("the file system has names in UTF-8 alone")
     out = tmp_path / "out"

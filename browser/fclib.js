@@ -42,7 +42,9 @@ function complete(given) {
   }
   const settings = { ...settings_of_solve, ...given };
   if (typeof settings.solver !== "string") refuse(`solver: ${settings.solver} is not a name`);
-  if (!(settings.tol >= 0)) refuse(`tol: ${settings.tol} is not a positive number`);
+  if (!(settings.tol >= 0 && settings.tol < Infinity)) {
+    refuse(`tol: ${settings.tol} is not a finite number of 0 or more`);
+  }
   const most = settings.max_iterations;
   if (most !== null && !(Number.isInteger(most) && most >= 1)) {
     refuse(`max_iterations: ${most} is not an integer of at least 1`);

@@ -77,7 +77,7 @@ static void solving(void) {
   CHECK(fclib_options_set_array(o, "gues", reactions, 6) && !fclib_solve_local_with(&a, o));
   fclib_options_delete(o);
   const char* wrong[][3] = {
-      {"tolerance", "-1", "outside"},         {"tolerance", "inf", "finite"},
+      {"tolerance", "-1", "outside"},         {"tolerance", "inf", "not a number"},
       {"tolerance", "small", "not a number"}, {"merit", "mine", "both, natural"},
       {"solver", "no_such", "no_such"},       {"tolerence", "1", "tolerence"}};
   for (unsigned k = 0; k < sizeof wrong / sizeof *wrong; k++) {

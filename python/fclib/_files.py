@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import errno
 import os
-import tempfile
+import secrets
+import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,8 +16,8 @@ from typing import Any
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Call `write` with the path of a new file beside `path`, which then takes its place.
 
-    What is no plain file, such as /dev/stdout, is written as it is; but a pipe that nothing reads
-    would wait for ever. OSError, which names `path`.
+    What is no plain file, such as /dev/stdout, is written as it is. OSError, which names `path`:
+    also for a pipe that nothing reads, which would wait for ever.
     """
     if path.exists() and not path.is_file():
         with _held(path):
@@ -24,11 +25,12 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
         return
     beside = None
     try:
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        os.close(descriptor)
-        beside = Path(name)
+        new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+        new.touch(exist_ok=False)
+        beside = new
+        mode = beside.stat().st_mode  # as the user's umask says; `write` may copy another one
         write(beside)
-        beside.chmod(0o644)
+        beside.chmod(stat.S_IMODE(mode))
         beside.replace(path)
     except OSError as error:
         if error.errno is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import stat
 from pathlib import Path
 
@@ -25,6 +26,15 @@ def test_a_failed_write_leaves_the_old_file_and_no_part(tmp_path: Path) -> None:
     assert caught.value.filename == str(path)
     assert path.read_text() == "a,b\n1,x\n2,y\n"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_new_file_has_the_mode_that_the_user_wants(tmp_path: Path) -> None:
+    before = os.umask(0o077)
+    try:
+        _files.write_text(tmp_path / "private.html", "")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "private.html").stat().st_mode) == 0o600
 
 
 def test_an_error_names_the_file_and_not_its_part(tmp_path: Path) -> None:

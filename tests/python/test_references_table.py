@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -37,7 +38,13 @@ def test_it_tells_where_check_and_verify_differ(tmp_path: Path, root: Path) -> N
     fclib.write(added, case.problem, case.solution)
     gone = next(path for path in sorted(folder.rglob("*.hdf5")) if path != added)
     gone.unlink()
+    damaged = folder / "small" / "Added" / "0001-local.hdf5"
+    damaged.write_bytes(b"no HDF5")
     done = table(folder, root)
     assert done.returncode == 1
     assert "Added/0000-local.hdf5: check says ok, verify says not listed" in done.stdout
+    # neither takes the damaged one
+    assert (
+        next(csv.DictReader(done.stdout[done.stdout.index("set,") :].splitlines()))["others"] == "1"
+    )
     assert f"{gone.relative_to(folder)}: missing, and check has not read it" in done.stdout

@@ -1,5 +1,4 @@
-"""The stored solutions of a collection: what `fclib check` says of each file, and whether
-`fclib collection verify` agrees.
+"""The stored solutions of a collection, by `fclib check` and by `fclib collection verify`.
 
     python -m workshop.tables.references FOLDER [--results references]
 
@@ -55,13 +54,15 @@ def main() -> None:
     verify = {
         row["problem"]: row["status"] for row in told("collection", "verify", str(given.folder))
     }
+    if not check:
+        parser.error(f"{given.folder}: fclib check reads no file there")
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     wrong = [f"{path}: {status}, and check has not read it" for path, status in verify.items()
              if path not in check]  # fmt: skip
     for path, row in check.items():
         own, says = counts[path.split("/")[0]], row.get("says") or {}
-        status, other = row["status"], verify.get(path, "not named")
-        right = status == "ok" or status == MARKED
+        status, other = row.get("status", "unreadable"), verify.get(path, "not named")
+        right = status in ("ok", MARKED)
         if right != (other == "ok"):
             wrong.append(f"{path}: check says {status}, verify says {other}")
         own["files"] += 1

@@ -154,8 +154,8 @@ def sampled(
 ) -> list[Path]:
     """Some problems of a family of the collection, as `problems.sample` takes them, built alone.
 
-    Empty if it is there or can be fetched, if no
-    states of it are stored, and if it has no more problems than these.
+    Empty if the family is there or can be fetched, if no states of it are stored, or if it has no
+    more problems than these.
 
     Args:
         name: SET/FAMILY; nothing else is sampled here.

@@ -210,8 +210,6 @@ def targets_of(
         ValueError: the arguments do not say what to write.
     """
     if out_dir is not None:
-        if out_dir.exists() and not out_dir.is_dir():
-            raise ValueError(f"{out_dir} is no folder")
         output = output or Format.hdf5
         files = [path for file in files for path in _sequence.steps_or_file(file)]
         targets = [out_dir / (_sequence.name_of(path) + EXTENSION_OF[output]) for path in files]
@@ -288,6 +286,9 @@ def command(
         usage_error(error)
     request = Request(form, storage, kind, force)
     report = Report(as_json, hidden=("n", "format", "matrix_info"))
+    if out_dir is not None and out_dir.exists() and not out_dir.is_dir():
+        report.error(out_dir, fclib.Error(f"{out_dir}: cannot be written: it is no folder"))
+        report.finish()
     target_of = dict(zip(sources, targets, strict=True))
     for source in each_file(sources, "converting"):
         target = target_of[source]

@@ -205,8 +205,6 @@ def write_deck(path: Path, source: Source) -> tuple[str, ...]:
         arrays[f"driven_{i}"] = np.array(
             [drive.body[1], drive.axis, drive.velocity, bool(course.points)]
         )
-        if len(course.points) == 1:
-            drive.place.fail("the engine takes evolutions of two points at least")
         arrays[f"values_{i}"] = (
             np.array(course.points).T.ravel()
             if course.points

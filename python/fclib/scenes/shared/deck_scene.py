@@ -49,8 +49,9 @@ class Placed:
     centre: Vector  # (3) [m]
     axes: Vector  # (3 x 3) columns: its principal axes, in the world
     velocity: Vector  # (6) of the centre, and the spin about the axes
-    # its contactors, with vertices, and the place and turn of boxes, in its own frame
+    # its contactors, with vertices and the place of others, in its own frame
     shapes: tuple[tuple[Contactor, Vector, Vector], ...]
+    turn: Vector  # (3 x 3) columns: the axes of BODIES.DAT, in its own frame
 
 
 def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
@@ -77,6 +78,11 @@ def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
     if not (min(moments) > 0 and volume > 0):
         body.place.fail("the mass and the inertia of a body must be > 0")
     start = deck.starts.get((RIGID, index, 0))
+    if start is not None and start.frame is not None and (axes != np.eye(3)).any():
+        start.place.fail(
+            "a, b, c are the axes of inertia, which LMGC90 finds and orders itself for this body:"
+            " give its avrd, I1, I2 and I3, and its contactors along these axes"
+        )
     turn = np.eye(3) if start is None or start.frame is None else start.frame
     moved = np.zeros(3) if start is None else start.displacement[:3]
     velocity = np.zeros(6) if start is None else start.velocity
@@ -90,6 +96,7 @@ def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
         turn @ axes,
         velocity,
         shapes,
+        axes.T,
     )
 
 
@@ -227,11 +234,12 @@ def _rigid(
     for i in sorted(still):
         one = all_placed[i]
         place = (one.centre, one.axes)
-        bodies += [_geom(shape, bits, assets, place, FIXED) for shape in one.shapes]
+        bodies += [_geom(shape, one.turn, bits, assets, place, FIXED) for shape in one.shapes]
     for rank, i in enumerate(moving):
         one = all_placed[i]
         geoms = "".join(
-            _geom(shape, bits, assets, None, mjcf.shade(rank, len(moving))) for shape in one.shapes
+            _geom(shape, one.turn, bits, assets, None, mjcf.shade(rank, len(moving)))
+            for shape in one.shapes
         )
         bodies.append(
             f'<body name="{RIGID} {i + 1}" pos="{mjcf.numbers(*one.centre)}"'
@@ -266,12 +274,16 @@ FIXED: Final = "0.55 0.57 0.6 1"  # the colour of what does not move
 
 def _geom(
     shape: tuple[Contactor, Vector, Vector],
+    turn: Vector,
     bits: dict[tuple[str, str], tuple[int, int, int]],
     assets: dict[str, str],
     place: tuple[Vector, Vector] | None,
     colour: str,
 ) -> str:
-    """A geometry of a body, or of the world if it has a place (centre, axes)."""
+    """A geometry of a body, or of the world if it has a place (centre, axes).
+
+    turn   (3 x 3) columns: the axes along which boxes lie, in the body's frame
+    """
     one, vertices, origin = shape
     own, seen, kind = bits.get((one.kind, one.colour), (0, 0, -1))
     look = (
@@ -291,7 +303,7 @@ def _geom(
         at, turn = centre, axes
     else:
         size = f'size="{mjcf.numbers(*one.size)}"'
-        at, turn = centre + axes @ origin, axes
+        at, turn = centre + axes @ origin, axes @ turn
     return (
         f'<geom type="{SHAPES[one.kind]}" {size} pos="{mjcf.numbers(*at)}"'
         f' quat="{mjcf.numbers(*quaternion(turn))}" {look}/>'

@@ -383,7 +383,8 @@ def test_bullets_reaction_gives_its_velocity() -> None:
         bullet.disconnect(client)
 
 
-def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
+def pinocchios_box(height: float, **options: Any) -> Any:
+    """A step of a box of 0.2 m that slides above a floor, z its middle [m]."""
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")
     coal = pytest.importorskip("coal", reason="Pinocchio is not installed")
     model, geometry = pin.Model(), pin.GeometryModel()
@@ -396,8 +397,12 @@ def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
     pair = [geometry.addGeometryObject(one) for one in (floor, box)]
     geometry.addCollisionPair(pin.CollisionPair(*pair))
     q, v = pin.neutral(model), np.zeros(6)
-    q[2], v[0] = 0.0999, 0.5
-    recorded = recorders.pinocchio(model, geometry, q, v, h=H, mu=0.6)
+    q[2], v[0] = height, 0.5
+    return recorders.pinocchio(model, geometry, q, v, mu=0.6, **options)
+
+
+def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
+    recorded = pinocchios_box(0.0999, h=H)
     assert recorded.problem.nc >= 1
     solution: Any = fclib.solve(recorded.problem, tol=1e-10).solution
     r = solution.r.reshape(-1, 3)
@@ -405,6 +410,17 @@ def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
     assert r[:, 0].sum() > 0
     assert solution.v[0] < 0.5
     np.testing.assert_allclose(np.hypot(r[:, 1], r[:, 2]), 0.6 * r[:, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("gap", "fall"), [(5e-4, 0.05), (2e-3, 0.0981), (-1e-3, 0.0)])
+def test_a_contact_within_pinocchios_margin_closes_its_gap(gap: float, fall: float) -> None:
+    """A body falls as far as its gap is wide, and freely if it does not reach the floor."""
+    h = 1e-2
+    recorded = pinocchios_box(0.1 + gap, h=h, margin=0.01)
+    assert recorded.problem.nc >= 1
+    np.testing.assert_allclose(recorded.contacts.gap, gap, atol=1e-9)
+    solution: Any = fclib.solve(recorded.problem, tol=1e-10).solution
+    assert solution.v[2] == pytest.approx(-fall, abs=1e-6)
 
 
 def newtons_solver(build: Any, **options: Any) -> tuple[Any, Any]:

@@ -57,6 +57,22 @@ def test_what_is_no_plain_file_stays_what_it_is() -> None:
     assert stat.S_ISCHR(null.stat().st_mode)
 
 
+def test_an_open_file_is_not_replaced(tmp_path: Path) -> None:
+    """A link like /dev/stdout stays one, though what it leads to is a plain file."""
+    if not Path("/proc/self/fd").is_dir():
+        pytest.skip("there is no /proc here")
+    with (tmp_path / "page.html").open("w") as file:
+        link = tmp_path / "stdout"
+        link.symlink_to(f"/proc/self/fd/{file.fileno()}")
+        assert link.is_file()
+        assert _files.is_open_or_device(link)
+        _files.write_text(link, "a page")
+        assert link.is_symlink()
+    assert (tmp_path / "page.html").read_text() == "a page"
+    assert not _files.is_open_or_device(tmp_path / "page.html")
+    assert not _files.is_open_or_device(tmp_path / "none.html")
+
+
 # ---- pictures
 
 

@@ -36,6 +36,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fclib import _core
+from fclib._words import counted
 from fclib.recorders._assemble import Assembled, Contacts, Vector
 from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, SetupError, no_step
 from fclib.scenes.shared import deck as decks
@@ -164,7 +165,7 @@ def makers_of(source: Source, every: int) -> Iterator[tuple[State, Maker]]:
     if ran.returncode:
         raise ChildProcessError(
             f"{source.path}: LMGC90's engine ended with status {ran.returncode} after"
-            f" {len(files)} steps; what it said is above"
+            f" {counted(len(files), 'step')}; what it said is above"
         )
 
 

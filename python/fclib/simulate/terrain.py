@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fclib._words import counted
 from fclib.simulate._mujoco import mujoco
 
 MOST: Final = int(mujoco.mjMAXCONPAIR)  # contacts of a pair that MuJoCo keeps
@@ -58,7 +59,8 @@ def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) 
     m.opt.disableflags = flags
     if any(mujoco.mj_addContact(m, d, contact) for contact in contacts):
         raise MemoryError(
-            f'no room for {len(contacts)} contacts; raise <size memory="..."/> in the MJCF'
+            f"no room for {counted(len(contacts), 'contact')}; raise"
+            ' <size memory="..."/> in the MJCF'
         )
 
 

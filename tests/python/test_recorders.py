@@ -764,7 +764,7 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     assert (list(sys.argv), list(sys.path)) == before
     again = CliRunner().invoke(app, common)
     assert again.exit_code == 1
-    assert "has files already" in " ".join(again.output.split())
+    assert "has steps already; name another folder" in " ".join(again.output.split())
 
 
 # spheres: nothing gyroscopic; the second runs into the first

@@ -419,6 +419,56 @@ def test_plates_of_a_body_keep_their_own_axes(tmp_path: Path) -> None:
         deck_scene.placed(decks.read(path), 1)
 
 
+def test_plates_have_frames_of_their_own(tmp_path: Path) -> None:
+    """As LMGC90 writes a PLANx: its axes and its place in the body."""
+    rng = np.random.default_rng(3)
+    turn, frame = np.linalg.qr(rng.normal(size=(2, 3, 3)))[0]
+    turn, frame = (q * np.sign(np.linalg.det(q)) for q in (turn, frame))
+    half, shift = np.array((0.6, 0.1, 0.2)), np.array((0.3, -0.2, 0.5))
+    plate = write.plate(half, turn=turn, shift=shift)
+    box = write.polyhedron(write.CORNERS * 0.2 + (0.5, 0.4, 0.1))
+    bodies = "\n".join(write.body(k, (0, 0, k), plate) for k in (1, 2))
+    bodies += "\n" + write.body(3, (0, 0, 3), plate, box)
+    sees = [write.law("iqsc0"), write.see("RBDY3  PLANx  VERTx", "RBDY3  POLYR  BLEUx")]
+    start = write.start(2, (0, 1, 0), np.zeros(6), frame)
+    files = {"BODIES": bodies, "TACT_BEHAV": "\n".join(sees), "DRV_DOF": "", "DOF": start}
+    deck = decks.read(write.blocks(tmp_path, **files))
+    assert not deck.unknown
+    one, two, three = (deck_scene.placed(deck, i) for i in range(3))
+    density = 2000.0
+    moments = density * 8 * half.prod() / 3 * (half @ half - half**2)
+    for body in (one, two):
+        np.testing.assert_allclose(body.moments, moments)
+        np.testing.assert_allclose(body.shapes[0][2], 0, atol=1e-12)
+    np.testing.assert_allclose(one.axes, turn)
+    np.testing.assert_allclose(one.centre, np.add((0, 0, 1), shift))
+    # the axes of a start stand for those of the plate, and its centre is not turned
+    np.testing.assert_allclose(two.axes, frame)
+    np.testing.assert_allclose(two.centre, np.add((0, 1, 2), shift))
+    np.testing.assert_allclose(two.axes @ two.turn @ turn, frame, atol=1e-12)
+    # the inertia of two shapes, by points of the plate and of the cube about their centre
+    corners = np.linspace(-1, 1, 41)[:-1] + 1 / 40
+    grid = np.stack(np.meshgrid(*[corners] * 3), axis=-1).reshape(-1, 3)
+    points = np.vstack((grid * half @ turn.T + shift, grid * 0.2 + (0.5, 0.4, 0.1)))
+    mass = density * np.repeat((8 * half.prod(), 8 * 0.2**3), len(grid)) / len(grid)
+    centre = mass @ points / mass.sum()
+    np.testing.assert_allclose(three.centre, np.add((0, 0, 3), centre), atol=1e-9)
+    arm = (points - centre) @ three.axes
+    second = np.einsum("i,ij,ik->jk", mass, arm, arm)
+    inertia = np.trace(second) * np.eye(3) - second
+    np.testing.assert_allclose(inertia, np.diag(three.moments), atol=1e-3 * inertia.max())
+    np.testing.assert_allclose(three.axes @ three.turn @ turn, turn, atol=1e-12)
+    np.testing.assert_allclose(
+        three.centre + three.axes @ three.shapes[0][2], np.add((0, 0, 3), shift)
+    )
+    wrong = {**files, "BODIES": bodies.replace("localframe", "localfr")}
+    with pytest.raises(decks.DeckError, match="'localfr' is no contactor"):
+        decks.read(write.blocks(tmp_path, **wrong))
+    skew = write.body(1, (0, 0, 1), write.plate(half, turn=2 * turn))
+    with pytest.raises(decks.DeckError, match=r"BODIES.DAT:11: the axes of the PLANx are not"):
+        decks.read(write.blocks(tmp_path, **{**files, "BODIES": skew}))
+
+
 # ---- rigid bodies that move
 
 

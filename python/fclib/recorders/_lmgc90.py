@@ -273,7 +273,7 @@ def solid(deck: Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
         contactor.place.fail("a SPHER; the engine of compas_lmgc90 takes POLYR and PLANx only")
     if contactor.kind == "PLANx":
         corners, faces = polyhedron.box_surface(np.array(contactor.size))
-        local = corners + origin
+        local = corners @ (one.turn @ contactor.turn).T + origin
     else:
         local, faces = vertices, contactor.faces
         try:

@@ -27,6 +27,7 @@ from fclib.scenes.shared.deck_bodies import BodiesReader
 from fclib.scenes.shared.deck_data import (
     CONTACTORS,
     ELEMENT,
+    FRAME,
     MESH,
     OTHER_BODIES,
     OTHER_CONTACTORS,
@@ -58,7 +59,6 @@ __all__ = ["DeckError", "folder_of", "read"]
 FOLDER: Final = "DATBOX"
 NEEDED: Final = ("BODIES.DAT", "BULK_BEHAV.DAT", "TACT_BEHAV.DAT")
 MODELS, START, DRIVEN = "MODELS.DAT", "DOF.INI", "DRV_DOF.DAT"
-FRAME: Final = 1e-5  # axes of a body are written with seven digits
 
 
 def folder_of(path: str | Path) -> Path | None:

@@ -65,35 +65,44 @@ def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
     volume = sum(part.volume for part in parts)
     if body.radius > 0:
         volume = polyhedron.ball(body.radius).volume
+    whole = joined(parts) if parts else polyhedron.Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    # LMGC90 finds the centre also if the inertia is given
+    centre, axes = whole.centre, np.eye(3)
+    plate = len(body.contactors) == 1 and body.contactors[0].kind == "PLANx"
+    if plate:
+        axes = body.contactors[0].turn
     if given:
-        centre, axes = np.zeros(3), np.eye(3)
         moments = density * np.array(body.inertia)
         if not any(body.inertia):
             moments = np.full(3, density * volume * body.gyration**2)
     else:
-        whole = joined(parts)
-        centre = whole.centre
-        moments, axes = whole.principal()
+        if plate:
+            moments = polyhedron.box(np.array(body.contactors[0].size)).inertia.diagonal()
+        else:
+            moments, axes = whole.principal()
         moments = moments * (density * volume / whole.volume)
     if not (min(moments) > 0 and volume > 0):
         body.place.fail("the mass and the inertia of a body must be > 0")
     start = deck.starts.get((RIGID, index, 0))
-    if start is not None and start.frame is not None and (axes != np.eye(3)).any():
-        start.place.fail(
-            "a, b, c are the axes of inertia, which LMGC90 finds and orders itself for this body:"
-            " give its avrd, I1, I2 and I3, and its contactors along these axes"
-        )
-    turn = np.eye(3) if start is None or start.frame is None else start.frame
+    placed_axes = axes
+    if start is not None and start.frame is not None:
+        if not plate and (axes != np.eye(3)).any():
+            start.place.fail(
+                "a, b, c are the axes of inertia, which LMGC90 finds and orders itself for this"
+                " body: give its avrd, I1, I2 and I3, and its contactors along these axes"
+            )
+        placed_axes = start.frame
     moved = np.zeros(3) if start is None else start.displacement[:3]
     velocity = np.zeros(6) if start is None else start.velocity
     shapes = tuple(
-        (one, (one.vertices - centre) @ axes, -axes.T @ centre) for one in body.contactors
+        (one, (one.vertices - centre) @ axes, axes.T @ (one.shift - centre))
+        for one in body.contactors
     )
     return Placed(
         float(density * volume),
         moments,
-        body.centre + moved + turn @ centre,
-        turn @ axes,
+        body.centre + moved + centre,
+        placed_axes,
         velocity,
         shapes,
         axes.T,
@@ -115,7 +124,9 @@ def _moments(one: Contactor, unknown: list[str]) -> polyhedron.Moments:
     if one.kind == "SPHER":
         return polyhedron.ball(one.size[0])
     if one.kind == "PLANx":
-        return polyhedron.box(np.array(one.size))
+        own = polyhedron.box(np.array(one.size))
+        turned = one.turn @ own.inertia @ one.turn.T
+        return polyhedron.Moments(own.volume, one.shift, turned)
     try:
         corners, triangles = polyhedron.hull(one.vertices)
     except ValueError as error:
@@ -303,7 +314,7 @@ def _geom(
         at, turn = centre, axes
     else:
         size = f'size="{mjcf.numbers(*one.size)}"'
-        at, turn = centre + axes @ origin, axes @ turn
+        at, turn = centre + axes @ origin, axes @ turn @ one.turn
     return (
         f'<geom type="{SHAPES[one.kind]}" {size} pos="{mjcf.numbers(*at)}"'
         f' quat="{mjcf.numbers(*quaternion(turn))}" {look}/>'

@@ -52,7 +52,7 @@ def record(
     for i in range(p.getNumConstraints(**options)):
         known = p.getConstraintInfo(p.getConstraintUniqueId(i, **options), **options)
         if known[0] in bodies or known[2] in bodies:
-            raise SetupError(f"constraint {i}: bodies without constraints are recorded")
+            raise ValueError(f"constraint {i}: bodies without constraints are recorded")
     n = 6 * len(bodies)
     place = {body: 6 * i for i, body in enumerate(bodies)}
     M, v0, v_free = np.zeros((n, n)), np.zeros(n), np.zeros(n)

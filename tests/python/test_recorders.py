@@ -352,7 +352,7 @@ def drakes() -> Any:
     def made(change: Any, model: str = "kPoint", **options: Any) -> tuple[Any, Any]:
         builder = drake.DiagramBuilder()
         plant, _ = drake.AddMultibodyPlantSceneGraph(builder, 1e-3)
-        plant.SetUseSampledOutputPorts(False)
+        plant.SetUseSampledOutputPorts(options.get("sampled", False))
         plant.set_contact_model(getattr(drake.ContactModel, model))
         material = drake.ProximityProperties()
         drake.AddContactMaterial(
@@ -448,6 +448,8 @@ def test_what_drakes_problem_does_not_have_is_refused(drakes: Any) -> None:
     def nothing(*_: Any) -> None:
         return None
 
+    with pytest.raises(ValueError, match="the plant's output is that of the last step"):
+        recorders.drake(*drakes(nothing, sampled=True))
     with pytest.raises(ValueError, match="the plant has constraints"):
         recorders.drake(*drakes(tied))
     with pytest.raises(ValueError, match="joint joint is locked"):

@@ -40,8 +40,9 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
 
     Raises:
         ImportError: Drake is not installed.
-        ValueError: the plant is continuous, has constraints, locked joints or contacts that are no
-            points, or a geometry has no stiffness for "sap", or a joint is at its limit there.
+        ValueError: the plant is continuous, has sampled output, constraints, locked joints or
+            contacts that are no points; for "sap", a geometry has no stiffness, or a joint is at
+            its limit.
     """
     drakes: Any = importlib.import_module("pydrake.all")
     h = plant.time_step()
@@ -181,6 +182,11 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
 
 def refuse(plant: Any, context: Any) -> None:
     """Raise SetupError or ValueError if a step has what is not recorded."""
+    if plant.has_sampled_output_ports():
+        raise SetupError(
+            "the plant's output is that of the last step: call SetUseSampledOutputPorts(False)"
+            " before Finalize"
+        )
     if any(plant.GetConstraintActiveStatus(context, one) for one in plant.GetConstraintIds()):
         raise SetupError("the plant has constraints, and only joints are recorded")
     for index in plant.GetJointIndices():

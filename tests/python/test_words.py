@@ -300,3 +300,7 @@ def test_one_thing_is_no_plural(tmp_path: Path) -> None:
     with fclib.SequenceWriter(tmp_path / "one.h5") as writer:
         writer.append(planted_local(1, nc=2).problem)
     assert repr(fclib.Sequence(tmp_path / "one.h5")).endswith("one.h5: 1 step>")
+    with pytest.raises(fclib.FileError, match="has 1 step; the first is number 0"):
+        fclib.read(f"{tmp_path / 'one.h5'}#3")
+    result = fclib.solve(planted_local(1, nc=5).problem, "nsgs", tol=1e-15, max_iterations=1)
+    assert ", 1 iteration, " in repr(result)

@@ -431,7 +431,12 @@ def test_plates_have_frames_of_their_own(tmp_path: Path) -> None:
     bodies += "\n" + write.body(3, (0, 0, 3), plate, box)
     sees = [write.law("iqsc0"), write.see("RBDY3  PLANx  VERTx", "RBDY3  POLYR  BLEUx")]
     start = write.start(2, (0, 1, 0), np.zeros(6), frame)
-    files = {"BODIES": bodies, "TACT_BEHAV": "\n".join(sees), "DRV_DOF": "", "DOF": start}
+    files: dict[str, Any] = {
+        "BODIES": bodies,
+        "TACT_BEHAV": "\n".join(sees),
+        "DRV_DOF": "",
+        "DOF": start,
+    }
     deck = decks.read(write.blocks(tmp_path, **files))
     assert not deck.unknown
     one, two, three = (deck_scene.placed(deck, i) for i in range(3))

@@ -404,7 +404,8 @@ def test_forces_that_drake_applies_are_in_the_problem(drakes: Any) -> None:
             one.p_BoBq_B = np.array([0.1, 0.2, 0.0])
             one.F_Bq_W = drake.SpatialForce(np.array([0.3, 0.1, 0.2]), np.array([40.0, 5, -3]))
             port = plant.get_applied_spatial_force_input_port()
-            port.FixValue(context, drake.Value[list[type(one)]]([one]))
+            kind: Any = list
+            port.FixValue(context, drake.Value[kind[type(one)]]([one]))
 
         return push
 
@@ -422,8 +423,8 @@ def test_forces_that_drake_applies_are_in_the_problem(drakes: Any) -> None:
 
     # a force on a body, a motor beyond its limit, and one with gains within it
     for change, torque in ((pushed, 0.0), (nothing, 50.0), (held, 0.0)):
-        for law in ("hard", "sap"):
-            recorded = recorders.drake(*drakes(change, torque=torque), law)
+        plant, context = drakes(change, torque=torque)
+        for recorded in (recorders.drake(plant, context, law) for law in ("hard", "sap")):
             assert recorded.problem.nc == 2
             assert np.abs(recorded.velocity).max() > 0.04
             assert recorded.mismatch is not None
@@ -456,9 +457,10 @@ def test_what_drakes_problem_does_not_have_is_refused(drakes: Any) -> None:
         recorders.drake(*drakes(locked))
     with pytest.raises(ValueError, match="contacts of surfaces are not recorded"):
         recorders.drake(*drakes(nothing, model="kHydroelasticWithFallback"))
+    plant, context = drakes(bent, bounds=(-0.1, 0.1))
     with pytest.raises(ValueError, match='at its limit, which is recorded by the law "hard" only'):
-        recorders.drake(*drakes(bent, bounds=(-0.1, 0.1)), "sap")
-    assert recorders.drake(*drakes(bent, bounds=(-0.1, 0.1))).problem.nc == 3
+        recorders.drake(plant, context, "sap")
+    assert recorders.drake(plant, context).problem.nc == 3
 
 
 def test_what_bullet_does_not_tell_is_named_or_refused() -> None:
@@ -471,7 +473,7 @@ def test_what_bullet_does_not_tell_is_named_or_refused() -> None:
         bullet.resetSimulation(**options)
         bullet.setPhysicsEngineParameter(numSubSteps=0, **options)
         bullet.setGravity(0, 0, -9.81, **options)
-        found = []
+        found: list[int] = []
         for mass, z, half in (
             (0, -0.5, (5, 5, 0.5)),
             (1, 0.0999, [0.1] * 3),

@@ -404,8 +404,9 @@ void bind_solvers(nb::module_& m) {
       .def_ro("cpu_s", &Stage::cpu_s, "[s] CPU time of all threads")
       .def_ro("time", &Stage::time, "[s] wall clock")
       .def("__repr__", [](const Stage& s) {
+        const std::string count = s.iterations == 1 ? " iteration>" : " iterations>";
         return "<Stage " + s.kind.name + ": solved " + std::to_string(s.solved) + " of " +
-               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
+               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + count;
       });
   nb::class_<Result> result(m, "Result",
                             "What fclib.solve returns. Results are equal if everything but their "
@@ -482,9 +483,10 @@ void bind_solvers(nb::module_& m) {
           "with iteration, error, time [s] and stage.")
       .def("__repr__", [](const Result& r) {
         char text[160];
-        std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",
+        std::snprintf(text, sizeof text, "<Result %s: %s, %lld iteration%s, error %.1e, %.2e s>",
                       r.solver.c_str(), std::string(name_of(r.status)).c_str(),
-                      static_cast<long long>(r.iterations), r.error, r.cpu_s);
+                      static_cast<long long>(r.iterations), r.iterations == 1 ? "" : "s", r.error,
+                      r.cpu_s);
         return std::string(text);
       });
   m.def(

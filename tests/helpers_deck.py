@@ -13,6 +13,7 @@ CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
 FACES += [(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
 PAD = " " * 29
+ABC = ("alp", "bet", "gam")  # LMGC90's names of the axes of a PLANx
 STILL = [
     f" vlocy  {k:5d}" + "  0.0000000D+00" * 4 + "  0.1000000D+01  0.0000000D+00"
     for k in range(1, 7)
@@ -57,9 +58,15 @@ def ball(radius: float, colour: str = "BLEUx") -> str:
     return f" SPHER      1  color  {colour}  byrd={fortran(radius)}"
 
 
-def plate(half: Any, colour: str = "VERTx") -> str:
-    """A contactor PLANx."""
-    return f" PLANx      1  color  {colour}  {row(three('axe'), half)}"
+def plate(half: Any, colour: str = "VERTx", turn: Any = None, shift: Any = (0, 0, 0)) -> str:
+    """A contactor PLANx, with its axes (columns) and its place in the body if it is turned."""
+    line = f" PLANx      1  color  {colour}  {row(three('axe'), half)}"
+    if turn is None:
+        return line
+    axes = [
+        PAD + row(three(name), column) for name, column in zip(ABC, np.transpose(turn), strict=True)
+    ]
+    return "\n".join([line, f"{PAD}localframe", *axes, PAD + row(three("coo"), shift)])
 
 
 def body(number: int, place: Any, *contactors: str, material: str = "STONE", bulk: str = "") -> str:

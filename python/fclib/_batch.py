@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fclib import _core, _device
 from fclib._equality import EqualByEntries
+from fclib._words import counted
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
@@ -371,7 +372,7 @@ def _blocks_of_each(
 
     if len(W) != len(counts):
         raise _core.ProblemError(
-            f"W: has {len(W)} problems, expected {len(counts)} as there are contacts"
+            f"W: has {counted(len(W), 'problem')}, expected {len(counts)} as there are contacts"
         )
     starts, columns, values = [], [], []
     for k, (one, nc) in enumerate(zip(W, counts, strict=True)):
@@ -423,7 +424,9 @@ def _of_bodies(
     sizes = None if contacts is None else spacedim * np.asarray(contacts)
     rows = matrix if sizes is None else np.split(matrix, np.cumsum(sizes)[:-1])
     if sizes is not None and len(matrix) != sizes.sum():
-        raise _core.ProblemError(f"jacobian: has {len(matrix)} rows, expected {sizes.sum()}")
+        raise _core.ProblemError(
+            f"jacobian: has {counted(len(matrix), 'row')}, expected {sizes.sum()}"
+        )
     if q is not None:
         if sizes is None:
             q = shaped("q", q, matrix.shape[:2])
@@ -505,7 +508,8 @@ def flat(name: str, values: Any, sizes: npt.NDArray[Any]) -> Any:
         return values
     if len(values) != len(sizes):
         raise _core.ProblemError(
-            f"{name}: has {len(values)} problems, expected {len(sizes)} as there are contacts"
+            f"{name}: has {counted(len(values), 'problem')}, expected {len(sizes)} as there are"
+            " contacts"
         )
     parts = [floats(name, one).reshape(-1) for one in values]
     for k, (part, size) in enumerate(zip(parts, sizes, strict=True)):

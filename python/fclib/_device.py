@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 
 from fclib import _core
+from fclib._words import counted
 
 # of CuPy: without its package there is no type to name
 DeviceArray = Any
@@ -80,7 +81,7 @@ class DeviceBatchResult:
         return _cupy().flatnonzero(self.status)
 
     def __repr__(self) -> str:
-        return f"<DeviceBatchResult: {len(self)} problems on a GPU>"
+        return f"<DeviceBatchResult: {counted(len(self), 'problem')} on a GPU>"
 
 
 def on_device(*arrays: Any) -> bool:

@@ -19,7 +19,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     What is no plain file, such as /dev/stdout, is written as it is. OSError, which names `path`:
     also for a pipe that nothing reads, which would wait for ever.
     """
-    if path.exists() and not path.is_file():
+    if is_open_or_device(path):
         with _held(path):
             write(path)
         return
@@ -39,6 +39,20 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     finally:
         if beside is not None:
             beside.unlink(missing_ok=True)
+
+
+def is_open_or_device(path: Path) -> bool:
+    """Whether no new file can take the place of what is there: a device, or an open file.
+
+    /dev/stdout is one, whatever it leads to: a plain file in its place would be /dev/stdout.
+    """
+    if not path.exists():
+        return False
+    places = [path.absolute()]
+    if path.is_symlink():
+        places.append(path.absolute().parent / path.readlink())
+    open_ones = (Path("/proc/self/fd"), Path("/dev/fd"))
+    return not path.is_file() or any(place.parent in open_ones for place in places)
 
 
 @contextmanager

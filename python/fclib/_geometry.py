@@ -16,6 +16,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from fclib._words import counted
+
 Integers = npt.NDArray[np.int32]
 Numbers = npt.NDArray[np.float64]
 
@@ -91,8 +93,8 @@ class _Table:
                 continue
             if known["count"] in counts and len(value) != counts[known["count"]]:
                 raise ValueError(
-                    f"/{group}/{own.name}: has {len(value)} rows, expected {known['count']} ="
-                    f" {counts[known['count']]}"
+                    f"/{group}/{own.name}: has {counted(len(value), 'row')}, expected"
+                    f" {known['count']} = {counts[known['count']]}"
                 )
             if value.dtype.kind == "f" and not np.isfinite(value).all():
                 raise ValueError(f"/{group}/{own.name}: has a value that is not finite")
@@ -128,7 +130,10 @@ class Contacts(_Table):
         """Make it from the columns of a file, for so many contacts. Raises ValueError."""
         made: Contacts = cls._made(columns, "contacts")
         if count is not None and len(made) != count:
-            raise ValueError(f"/contacts: has {len(made)} rows, and the problem {count} contacts")
+            raise ValueError(
+                f"/contacts: has {counted(len(made), 'row')}, and the problem"
+                f" {counted(count, 'contact')}"
+            )
         return made
 
     def __len__(self) -> int:
@@ -254,7 +259,9 @@ class Bodies(_Table):
         counts = {"nb": len(self.moves), "ns": len(self.shape_kind), "1": 1, "2": 2}
         self._check("bodies", counts)
         if len(self.names) != counts["nb"]:
-            raise ValueError(f"/bodies/name: has {len(self.names)} lines, expected {counts['nb']}")
+            raise ValueError(
+                f"/bodies/name: has {counted(len(self.names), 'line')}, expected {counts['nb']}"
+            )
         for name, values, bound in (
             ("shape_body", self.shape_body, counts["nb"]),
             ("shape_kind", self.shape_kind, len(KINDS)),
@@ -334,7 +341,10 @@ def carried(
     """
     local = np.asarray(r, dtype=float)
     if local.size != d * len(before):
-        raise ValueError(f"{local.size} reactions for {len(before)} contacts of {d} components")
+        raise ValueError(
+            f"{counted(local.size, 'reaction')} for {counted(len(before), 'contact')} of {d}"
+            " components"
+        )
     local = local.reshape(-1, d)
 
     source = np.full(len(now), -1)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fclib import _core
 from fclib._solve import Problem
+from fclib._words import counted
 
 SUFFIXES = (".h5", ".hdf5")  # of a name that is that of a file, and not of a folder
 STEP = re.compile(r"(.+)#([0-9]+)", re.DOTALL)
@@ -126,7 +127,9 @@ class Sequence:
         """
         step = k + len(self) if k < 0 else k
         if not 0 <= step < len(self):
-            raise IndexError(f"{self._path} has {len(self)} steps, and none of number {k}")
+            raise IndexError(
+                f"{self._path} has {counted(len(self), 'step')}, and none of number {k}"
+            )
         return _core.step_path(self._path, step)
 
     def __getitem__(self, k: int) -> Problem:
@@ -147,4 +150,4 @@ class Sequence:
 
     def __repr__(self) -> str:
         """Say the path and the length."""
-        return f"<Sequence {self._path}: {len(self)} steps>"
+        return f"<Sequence {self._path}: {counted(len(self), 'step')}>"

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from fclib._files import write_text
+from fclib._words import counted
 from fclib.bench import comparison, profiles
 from fclib.bench.plots import COLOURS
 from fclib.report import view as views
@@ -158,7 +159,7 @@ def profile(
     words = comparison.METRICS[metric][0]
     figure.update_xaxes(type="log", title=f"at most so many times the best ({words})")
     figure.update_yaxes(range=[0, 1.01], tickformat=".0%", title="share of the instances")
-    title = f"Tolerance {chosen:g}, {len(part.instances)} instances"
+    title = f"Tolerance {chosen:g}, {counted(len(part.instances), 'instance')}"
     return figure.update_layout(title=title, template="plotly_white", height=450)
 
 

@@ -622,6 +622,30 @@ def test_a_part_that_cannot_be_read_is_named_once(tmp_path: Path) -> None:
     assert done.stderr.count(str(empty)) == 1
 
 
+def test_standard_output_gets_a_page_and_no_name(files: list[Path], tmp_path: Path) -> None:
+    """Whether it is a pipe or a file."""
+    done = start("view", files[0], "--out", "/dev/stdout")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("</html>\n")
+    page = tmp_path / "page.html"
+    with page.open("w") as out:
+        command = [sys.executable, "-m", "fclib", "view", str(files[0]), "--out", "/dev/stdout"]
+        subprocess.run(command, stdout=out, check=True)
+    assert page.read_text().endswith("</html>\n")
+    assert Path("/dev/stdout").is_symlink()
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "siconos"])
+def test_a_file_is_not_converted_onto_a_device(files: list[Path], kind: str) -> None:
+    for more in ([], ["--force"]):
+        done = start("convert", files[0], "/dev/stdout", "--format", kind, *more)
+        assert done.returncode == 1
+        assert not done.stdout
+        assert (
+            done.stderr == "fclib: /dev/stdout: is a device or a pipe; name a file to be written\n"
+        )
+
+
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:
     for command in ("info", "solve", "check"):
         result = start(command, *files)

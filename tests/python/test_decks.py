@@ -83,7 +83,10 @@ def test_a_value_changes_as_lmgc90_says() -> None:
         expected = (2 + 3 * np.cos(5 * time + 0.5)) * min(1, 0.25 + 0.5 * time)
         assert wave.at(time) == pytest.approx(expected, abs=1e-14)
     table = Course(points=((1.0, 0.0), (2.0, 10.0), (4.0, -10.0)))
-    assert [table.at(t) for t in (0, 1, 1.5, 2, 3, 4, 9)] == [0, 0, 5, 10, 0, -10, -10]
+    assert [table.at(t) for t in (1, 1.5, 2, 3, 4)] == [0, 5, 10, 0, -10]
+    # beyond its ends a table goes on, and below -1 a ramp, as in the engine (test_lmgc90.py)
+    assert [table.at(t) for t in (0, 9)] == [-10, -60]
+    assert Course(constant=1.0, ramp=-1.5, ramp_rate=-1.0).at(1.0) == -2.5
     assert Course(constant=1.0, ramp=0.0).is_zero
     assert not Course(constant=1.0, ramp=0.0, ramp_rate=1.0).is_zero
 
@@ -197,8 +200,23 @@ def test_a_bad_evolution_is_refused(tmp_path: Path) -> None:
     (path / "push.dat").write_text("0. 1.\n1.\n")
     with pytest.raises(decks.DeckError, match=r"push.dat:2: a time and a value"):
         decks.read(path)
+    (path / "push.dat").write_text("0. 1.\n")
+    with pytest.raises(decks.DeckError, match=r"push.dat:1: an evolution has two times"):
+        decks.read(path)
     (path / "push.dat").write_text("0. 1.\n0.5D+01 2.D0\n")
     assert decks.read(path).driven[0].course.at(2.5) == 1.5
+
+
+def test_a_ramp_that_falls_below_its_bound_is_named(tmp_path: Path) -> None:
+    def unknown(row: str) -> tuple[str, ...]:
+        path = write.blocks(tmp_path, DRV_DOF=write.driven(2, f" force      1  {row}"))
+        return decks.read(path).unknown
+
+    assert not unknown("1.0 0.0 0.0 0.0 -1.0 2.0")
+    assert not unknown("0.0 0.0 0.0 0.0 0.0 -2.0")
+    for row in ("1.0 0.0 0.0 0.0 -1.5 2.0", "0.0 1.0 0.0 0.0 1.0 -2.0"):
+        (word,) = unknown(row)
+        assert "DRV_DOF.DAT:6: below -1 the ramp" in word
 
 
 def test_a_bad_start_is_refused(tmp_path: Path) -> None:
@@ -369,6 +387,91 @@ def test_masses_that_the_deck_gives(tmp_path: Path) -> None:
     ball = 2000 * 4 / 3 * np.pi * 0.125
     assert three.mass == pytest.approx(ball)
     np.testing.assert_allclose(three.moments, 0.4 * ball * 0.25)
+
+
+def test_plates_of_a_body_keep_their_own_axes(tmp_path: Path) -> None:
+    """A body of several contactors has principal axes that are not those of BODIES.DAT."""
+    mujoco = pytest.importorskip("mujoco")
+    from fclib.simulate import MujocoModel
+
+    corners = write.CORNERS * 0.2 + (0.5, 0.4, 0.1)
+    half = (0.6, 0.1, 0.2)
+    body = write.body(2, (0, 0, 3), write.plate(half), write.polyhedron(corners))
+    held = write.body(1, (9, 0, 0), write.plate(half), write.polyhedron(corners))
+    sees = [write.law("iqsc0"), write.see("RBDY3  PLANx  VERTx", "RBDY3  POLYR  BLEUx")]
+    path = write.blocks(tmp_path, BODIES=f"{held}\n{body}", TACT_BEHAV="\n".join(sees))
+    deck = decks.read(path)
+    one = deck_scene.placed(deck, 1)
+    # they are turned indeed
+    assert np.abs(one.axes).max(axis=0).min() < 0.95
+    model = MujocoModel(deck_scene.scene_of(deck, time_step=1e-3))
+    m, d = model.model, model.data
+    mujoco.mj_kinematics(m, d)
+    boxes = np.flatnonzero(m.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
+    assert len(boxes) == 2
+    for box, centre in zip(boxes, ((9, 0, 0), (0, 0, 3)), strict=True):
+        np.testing.assert_allclose(d.geom_xpos[box], centre, atol=1e-12)
+        np.testing.assert_allclose(d.geom_xmat[box].reshape(3, 3), np.eye(3), atol=1e-9)
+    # axes of a start would be those that LMGC90 finds, in its own order
+    start = write.start(2, (0, 0, 0), np.zeros(6))
+    path = write.blocks(tmp_path, BODIES=f"{held}\n{body}", TACT_BEHAV="\n".join(sees), DOF=start)
+    with pytest.raises(decks.DeckError, match=r"DOF.INI:4: a, b, c are the axes of inertia"):
+        deck_scene.placed(decks.read(path), 1)
+
+
+def test_plates_have_frames_of_their_own(tmp_path: Path) -> None:
+    """As LMGC90 writes a PLANx: its axes and its place in the body."""
+    rng = np.random.default_rng(3)
+    turn, frame = np.linalg.qr(rng.normal(size=(2, 3, 3)))[0]
+    turn, frame = (q * np.sign(np.linalg.det(q)) for q in (turn, frame))
+    half, shift = np.array((0.6, 0.1, 0.2)), np.array((0.3, -0.2, 0.5))
+    plate = write.plate(half, turn=turn, shift=shift)
+    box = write.polyhedron(write.CORNERS * 0.2 + (0.5, 0.4, 0.1))
+    bodies = "\n".join(write.body(k, (0, 0, k), plate) for k in (1, 2))
+    bodies += "\n" + write.body(3, (0, 0, 3), plate, box)
+    sees = [write.law("iqsc0"), write.see("RBDY3  PLANx  VERTx", "RBDY3  POLYR  BLEUx")]
+    start = write.start(2, (0, 1, 0), np.zeros(6), frame)
+    files: dict[str, Any] = {
+        "BODIES": bodies,
+        "TACT_BEHAV": "\n".join(sees),
+        "DRV_DOF": "",
+        "DOF": start,
+    }
+    deck = decks.read(write.blocks(tmp_path, **files))
+    assert not deck.unknown
+    one, two, three = (deck_scene.placed(deck, i) for i in range(3))
+    density = 2000.0
+    moments = density * 8 * half.prod() / 3 * (half @ half - half**2)
+    for body in (one, two):
+        np.testing.assert_allclose(body.moments, moments)
+        np.testing.assert_allclose(body.shapes[0][2], 0, atol=1e-12)
+    np.testing.assert_allclose(one.axes, turn)
+    np.testing.assert_allclose(one.centre, np.add((0, 0, 1), shift))
+    # the axes of a start stand for those of the plate, and its centre is not turned
+    np.testing.assert_allclose(two.axes, frame)
+    np.testing.assert_allclose(two.centre, np.add((0, 1, 2), shift))
+    np.testing.assert_allclose(two.axes @ two.turn @ turn, frame, atol=1e-12)
+    # the inertia of two shapes, by points of the plate and of the cube about their centre
+    corners = np.linspace(-1, 1, 41)[:-1] + 1 / 40
+    grid = np.stack(np.meshgrid(*[corners] * 3), axis=-1).reshape(-1, 3)
+    points = np.vstack((grid * half @ turn.T + shift, grid * 0.2 + (0.5, 0.4, 0.1)))
+    mass = density * np.repeat((8 * half.prod(), 8 * 0.2**3), len(grid)) / len(grid)
+    centre = mass @ points / mass.sum()
+    np.testing.assert_allclose(three.centre, np.add((0, 0, 3), centre), atol=1e-9)
+    arm = (points - centre) @ three.axes
+    second = np.einsum("i,ij,ik->jk", mass, arm, arm)
+    inertia = np.trace(second) * np.eye(3) - second
+    np.testing.assert_allclose(inertia, np.diag(three.moments), atol=1e-3 * inertia.max())
+    np.testing.assert_allclose(three.axes @ three.turn @ turn, turn, atol=1e-12)
+    np.testing.assert_allclose(
+        three.centre + three.axes @ three.shapes[0][2], np.add((0, 0, 3), shift)
+    )
+    wrong = {**files, "BODIES": bodies.replace("localframe", "localfr")}
+    with pytest.raises(decks.DeckError, match="'localfr' is no contactor"):
+        decks.read(write.blocks(tmp_path, **wrong))
+    skew = write.body(1, (0, 0, 1), write.plate(half, turn=2 * turn))
+    with pytest.raises(decks.DeckError, match=r"BODIES.DAT:11: the axes of the PLANx are not"):
+        decks.read(write.blocks(tmp_path, **{**files, "BODIES": skew}))
 
 
 # ---- rigid bodies that move

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from fclib import _files
@@ -51,3 +55,74 @@ def test_what_is_no_plain_file_stays_what_it_is() -> None:
     null = Path("/dev/null")
     _files.write_text(null, "nothing")
     assert stat.S_ISCHR(null.stat().st_mode)
+
+
+def test_an_open_file_is_not_replaced(tmp_path: Path) -> None:
+    """A link like /dev/stdout stays one, though what it leads to is a plain file."""
+    if not Path("/proc/self/fd").is_dir():
+        pytest.skip("there is no /proc here")
+    with (tmp_path / "page.html").open("w") as file:
+        link = tmp_path / "stdout"
+        link.symlink_to(f"/proc/self/fd/{file.fileno()}")
+        assert link.is_file()
+        assert _files.is_open_or_device(link)
+        _files.write_text(link, "a page")
+        assert link.is_symlink()
+    assert (tmp_path / "page.html").read_text() == "a page"
+    assert not _files.is_open_or_device(tmp_path / "page.html")
+    assert not _files.is_open_or_device(tmp_path / "none.html")
+
+
+# ---- pictures
+
+
+def full(path: Any, *_: Any, **__: Any) -> None:
+    """Write half of a file onto a full disk."""
+    Path(path).write_text("half of")
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def scene(path: Path, patch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    from fclib import scenes, simulate
+
+    module = importlib.import_module("fclib.simulate.render")
+    # what a renderer would draw
+    patch.setattr(module, "draw", lambda *_: np.zeros((20, 20, 3), np.uint8))
+    model = simulate.MujocoModel(scenes.get("BoxesStack")(boxes=1).scene())
+    written = Path.write_bytes
+    patch.setattr(Path, "write_bytes", full)
+    try:
+        simulate.render(model, path, size=(10, 10))
+    finally:
+        patch.setattr(Path, "write_bytes", written)
+
+
+def distribution(path: Path, patch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    from fclib.collections import figures
+
+    patch.setattr("matplotlib.figure.Figure.savefig", lambda _, *given, **__: full(*given))
+    figures.draw_distribution([{"nc": 1, "n": 6, "density": 0.5}], path.parent, "one")
+
+
+def matrix(path: Path, patch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("PIL")
+    from fclib.report import picture
+
+    patch.setattr("PIL.Image.Image.save", lambda _, *given, **__: full(*given))
+    picture.draw_matrix(np.eye(3), path)
+
+
+@pytest.mark.parametrize("draw", [scene, distribution, matrix])
+def test_a_picture_that_cannot_be_written_leaves_the_old_one(
+    draw: Callable[[Path, pytest.MonkeyPatch], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "distribution.png"
+    path.write_text("the old one")
+    with pytest.raises(OSError, match="No space left on device"):
+        draw(path, monkeypatch)
+    assert path.read_text() == "the old one"
+    assert list(tmp_path.iterdir()) == [path]

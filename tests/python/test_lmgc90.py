@@ -100,7 +100,7 @@ def test_the_jacobian_is_that_of_rigid_bodies() -> None:
             "TACT_BEHAV.DAT:2: the law GAP_SGR_CLB",
         ),
         (
-            {"DOF": write.start(2, (0, 0, 0), (1, 0, 0, 0, 0, 0))},
+            {"DOF": write.start(3, (0, 0, 0), (1, 0, 0, 0, 0, 0))},
             "DOF.INI:4: a body that moves at the start",
         ),
     ],
@@ -214,6 +214,32 @@ def test_a_driven_block_pushes(tmp_path: Path) -> None:
         of_plate = one.contacts.bodies.min(axis=1) == 0
         w = np.reshape(one.problem.w, (-1, 3))[of_plate, 1:]
         np.testing.assert_allclose(np.linalg.norm(w, axis=1), abs(speed), rtol=1e-6)
+
+
+@pytest.mark.usefixtures("engine")
+@pytest.mark.parametrize(
+    ("row", "table"),
+    [
+        ("0.1 0.0 0.0 0.0 -2.0 0.0", ""),
+        ("0.1 0.0 0.0 0.0 -0.5 -50.0", ""),
+        ("0.1 0.0 0.0 0.0 3.0 0.0", ""),
+        ("evolution  push.dat", "0.004 0.1\n0.008 0.2\n"),
+    ],
+)
+def test_the_engine_drives_as_a_course_says(tmp_path: Path, row: str, table: str) -> None:
+    """A ramp goes on below -1 and not above 1, and a table goes on beyond both of its ends."""
+    rows = [f" vlocy      1  {row}", *write.STILL[1:]]
+    path = write.blocks(tmp_path, DRV_DOF=write.driven(1, *rows))
+    if table:
+        (path / "push.dat").write_text(table)
+    h, theta, steps = 1e-3, 0.5, 20
+    source = _lmgc90.Source(path, steps=steps, time_step=h, theta=theta)
+    states = [state for state, _ in _lmgc90.states_of(source, 1)]
+    course = decks.read(path).driven[0].course
+    speeds = np.array([course.at(i * h) for i in range(steps)])
+    moved = np.diff([state.place[0, 0] for state in states])
+    expected = h * ((1 - theta) * speeds[:-1] + theta * speeds[1:])
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
 
 
 @pytest.mark.usefixtures("engine")

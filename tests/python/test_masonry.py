@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fclib import scenes
-from fclib.scenes.shared import masonry
+from fclib.scenes.shared import masonry, mjcf
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
@@ -214,6 +214,30 @@ def test_arcade_is_filled_without_gaps() -> None:
     opening = 9 * 0.5 * math.sin(math.pi / 9) * arcade.inner**2
     total = sum(masonry.area(outline) for _, outline in arcade.stones())
     assert total == pytest.approx(whole - 2 * opening)
+
+
+@pytest.mark.parametrize("speeds", [(0.1, 0.0, 0.2), (0.0, 0.1, 0.0), (0.2, 0.1, 0.3)])
+def test_supports_do_not_touch_each_other(speeds: tuple[float, ...]) -> None:
+    """Whichever of them are driven, and in whatever order they are set."""
+    built = masonry.Masonry(density=2000.0, mu=0.5, lap=1e-5)
+    built.stone("stone", masonry.rectangle(0.0, 3.0, 1.0, 1.5), 0.0, 1.0, "1 1 1 1")
+    for i, speed in enumerate(speeds):
+        outline = masonry.rectangle(0.9 * i, 0.9 * i + 1.0, 0.0, 1.0)
+        built.support(f"support{i}", [outline], 0.0, 1.0, speed=speed)
+    xml = mjcf.document(
+        "supports",
+        bodies=built.bodies,
+        assets=built.assets,
+        time_step=1e-3,
+        gravity=9.81,
+        floor_mu=0.5,
+        tile=1.0,
+        rest=[*built.rest, *built.keyframe()],
+    )
+    (step,) = simulate(scenes.Scene(name="supports", xml=xml), 1)
+    m = mujoco_of(step)
+    assert len(step.contacts)
+    assert (m.geom_bodyid[step.contacts.pair] == m.body("stone").id).any(axis=1).all()
 
 
 @pytest.mark.parametrize(

@@ -398,6 +398,11 @@ def test_the_commands(tmp_path: Path) -> None:
     shutil.rmtree(parts)
     parts.mkdir()
     assert "no part" in said("results", "verify", "--in", parts, code=1)
+    for word in ("list", "show", "leaders"):
+        told = said("results", word, "--in", parts, code=1)
+        assert "".join(f"fclib: {parts}: has no part, *.parquet".split()) in "".join(told.split())
+        told = said("results", word, "--in", part, code=1)
+        assert "".join(f"fclib: {part}: is no folder of parts".split()) in "".join(told.split())
 
 
 def test_a_long_history_is_thinned_and_keeps_its_ends() -> None:

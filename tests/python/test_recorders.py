@@ -341,6 +341,183 @@ def test_drakes_free_velocity_is_ours() -> None:
         assert recorded.mismatch < 1e-12
 
 
+@pytest.fixture
+def drakes() -> Any:
+    """A function that makes a plant of Drake's, an arm with a motor and two balls on a floor.
+
+    `change` is called before the plant is finalized, and returns what is done to its context.
+    """
+    drake = pytest.importorskip("pydrake.all", reason="Drake is not installed")
+
+    def made(change: Any, model: str = "kPoint", **options: Any) -> tuple[Any, Any]:
+        builder = drake.DiagramBuilder()
+        plant, _ = drake.AddMultibodyPlantSceneGraph(builder, 1e-3)
+        plant.SetUseSampledOutputPorts(options.get("sampled", False))
+        plant.set_contact_model(getattr(drake.ContactModel, model))
+        material = drake.ProximityProperties()
+        drake.AddContactMaterial(
+            point_stiffness=1e6, friction=drake.CoulombFriction(0.5, 0.5), properties=material
+        )
+        soft = drake.ProximityProperties(material)
+        drake.AddCompliantHydroelasticProperties(0.05, 1e6, soft)
+        half = drake.RigidTransform([0, 0, -0.5])
+        floor = drake.Box(9, 9, 1)
+        stiff = drake.ProximityProperties(material)
+        drake.AddRigidHydroelasticProperties(0.5, stiff)
+        plant.RegisterCollisionGeometry(plant.world_body(), half, floor, "floor", stiff)
+        inertia = drake.SpatialInertia.SolidBoxWithMass(1, 0.1, 0.1, 0.1)
+        turning = plant.AddRigidBody("arm", inertia)
+        joint = drake.RevoluteJoint(
+            "joint",
+            plant.world_frame(),
+            turning.body_frame(),
+            [0, 1, 0],
+            *options.get("bounds", ()),
+        )
+        joint = plant.AddJoint(joint)
+        motor = plant.AddJointActuator("motor", joint, effort_limit=5.0)
+        balls = [plant.AddRigidBody(name, inertia) for name in ("one", "two")]
+        for ball in balls:
+            plant.RegisterCollisionGeometry(
+                ball, drake.RigidTransform(), drake.Sphere(0.1), "ball", soft
+            )
+        after = change(drake, plant, joint, motor, balls)
+        plant.Finalize()
+        context = plant.GetMyMutableContextFromRoot(builder.Build().CreateDefaultContext())
+        for x, ball in enumerate(balls):
+            place = drake.RigidTransform(drake.RollPitchYaw(0.5, 0, 1), [x, 0, 0.0999])
+            plant.SetFreeBodyPose(context, ball, place)
+        port = plant.get_actuation_input_port()
+        port.FixValue(context, [options.get("torque", 0.0)])
+        if after is not None:
+            after(context)
+        return plant, context
+
+    return made
+
+
+def test_forces_that_drake_applies_are_in_the_problem(drakes: Any) -> None:
+    def pushed(drake: Any, plant: Any, joint: Any, motor: Any, balls: Any) -> Any:
+        def push(context: Any) -> None:
+            one = drake.ExternallyAppliedSpatialForce_[float]()
+            one.body_index = balls[0].index()
+            one.p_BoBq_B = np.array([0.1, 0.2, 0.0])
+            one.F_Bq_W = drake.SpatialForce(np.array([0.3, 0.1, 0.2]), np.array([40.0, 5, -3]))
+            port = plant.get_applied_spatial_force_input_port()
+            kind: Any = list
+            port.FixValue(context, drake.Value[kind[type(one)]]([one]))
+
+        return push
+
+    def held(drake: Any, plant: Any, joint: Any, motor: Any, balls: Any) -> Any:
+        motor.set_controller_gains(drake.PdControllerGains(p=1000, d=10))
+
+        def aim(context: Any) -> None:
+            port = plant.get_desired_state_input_port(motor.model_instance())
+            port.FixValue(context, [0.001, 0.0])
+
+        return aim
+
+    def nothing(*_: Any) -> None:
+        return None
+
+    # a force on a body, a motor beyond its limit, and one with gains within it
+    for change, torque in ((pushed, 0.0), (nothing, 50.0), (held, 0.0)):
+        plant, context = drakes(change, torque=torque)
+        for recorded in (recorders.drake(plant, context, law) for law in ("hard", "sap")):
+            assert recorded.problem.nc == 2
+            assert np.abs(recorded.velocity).max() > 0.04
+            assert recorded.mismatch is not None
+            assert recorded.mismatch < 1e-6
+            assert described(recorded)["fields"]["f"] == "exact"
+
+
+def test_what_drakes_problem_does_not_have_is_refused(drakes: Any) -> None:
+    def tied(drake: Any, plant: Any, joint: Any, motor: Any, balls: Any) -> None:
+        plant.AddDistanceConstraint(balls[0], np.zeros(3), balls[1], np.zeros(3), 1.0)
+
+    def locked(drake: Any, plant: Any, joint: Any, motor: Any, balls: Any) -> Any:
+        return joint.Lock
+
+    def bent(drake: Any, plant: Any, joint: Any, motor: Any, balls: Any) -> Any:
+        def bend(context: Any) -> None:
+            joint.set_angle(context, 0.11)
+            joint.set_angular_rate(context, 1.0)
+
+        return bend
+
+    def nothing(*_: Any) -> None:
+        return None
+
+    with pytest.raises(ValueError, match="the plant's output is that of the last step"):
+        recorders.drake(*drakes(nothing, sampled=True))
+    with pytest.raises(ValueError, match="the plant has constraints"):
+        recorders.drake(*drakes(tied))
+    with pytest.raises(ValueError, match="joint joint is locked"):
+        recorders.drake(*drakes(locked))
+    with pytest.raises(ValueError, match="contacts of surfaces are not recorded"):
+        recorders.drake(*drakes(nothing, model="kHydroelasticWithFallback"))
+    plant, context = drakes(bent, bounds=(-0.1, 0.1))
+    with pytest.raises(ValueError, match='at its limit, which is recorded by the law "hard" only'):
+        recorders.drake(plant, context, "sap")
+    assert recorders.drake(plant, context).problem.nc == 3
+
+
+def test_what_bullet_does_not_tell_is_named_or_refused() -> None:
+    bullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
+    client = bullet.connect(bullet.DIRECT)
+    options = {"physicsClientId": client}
+
+    def world() -> list[int]:
+        """Two boxes on the ground."""
+        bullet.resetSimulation(**options)
+        bullet.setPhysicsEngineParameter(numSubSteps=0, **options)
+        bullet.setGravity(0, 0, -9.81, **options)
+        found: list[int] = []
+        for mass, z, half in (
+            (0, -0.5, (5, 5, 0.5)),
+            (1, 0.0999, [0.1] * 3),
+            (1, 0.0999, [0.1] * 3),
+        ):
+            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, **options)
+            place = [float(len(found)), 0, z]
+            body = bullet.createMultiBody(mass, shape, basePosition=place, **options)
+            bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0, **options)
+            found.append(body)
+        return found
+
+    try:
+        world()
+        assert described(recorders.pybullet(client))["fields"]["M"] == "exact"
+        _, one, _ = world()
+        bullet.applyExternalForce(one, -1, [9, 0, 0], [1, 0, 0], bullet.WORLD_FRAME, **options)
+        pushed = recorders.pybullet(client)
+        assert described(pushed)["fields"]["M"] == "reconstructed"
+        assert any("gives its next velocity to" in note for note in pushed.notes)
+        world()
+        with pytest.raises(ValueError, match=r"the engine's step is 0\.00416667 s, not 0\.001"):
+            recorders.pybullet(client, h=1e-3)
+        bullet.setPhysicsEngineParameter(numSubSteps=4, **options)
+        with pytest.raises(ValueError, match="a step of several substeps"):
+            recorders.pybullet(client)
+        _, one, two = world()
+        bullet.createConstraint(
+            one, -1, two, -1, bullet.JOINT_FIXED, [0, 0, 0], [1, 0, 0], [0, 0, 0], **options
+        )
+        with pytest.raises(ValueError, match="constraint 0: bodies without constraints"):
+            recorders.pybullet(client)
+        _, one, _ = world()
+        bullet.changeDynamics(one, -1, rollingFriction=0.1, **options)
+        with pytest.raises(ValueError, match=f"body {one}: resists rolling or spin"):
+            recorders.pybullet(client)
+        _, one, two = world()
+        bullet.resetBasePositionAndOrientation(two, [1, 0, 0.2999], [0, 0, 0, 1], **options)
+        with pytest.raises(ValueError, match=f"body {two}: moves, and is not among the recorded"):
+            recorders.pybullet(client, [one])
+    finally:
+        bullet.disconnect(client)
+
+
 def test_bullets_reaction_gives_its_velocity() -> None:
     bullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
     client = bullet.connect(bullet.DIRECT)
@@ -383,7 +560,8 @@ def test_bullets_reaction_gives_its_velocity() -> None:
         bullet.disconnect(client)
 
 
-def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
+def pinocchios_box(height: float, **options: Any) -> Any:
+    """A step of a box of 0.2 m that slides above a floor, z its middle [m]."""
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")
     coal = pytest.importorskip("coal", reason="Pinocchio is not installed")
     model, geometry = pin.Model(), pin.GeometryModel()
@@ -396,8 +574,12 @@ def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
     pair = [geometry.addGeometryObject(one) for one in (floor, box)]
     geometry.addCollisionPair(pin.CollisionPair(*pair))
     q, v = pin.neutral(model), np.zeros(6)
-    q[2], v[0] = 0.0999, 0.5
-    recorded = recorders.pinocchio(model, geometry, q, v, h=H, mu=0.6)
+    q[2], v[0] = height, 0.5
+    return recorders.pinocchio(model, geometry, q, v, mu=0.6, **options)
+
+
+def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
+    recorded = pinocchios_box(0.0999, h=H)
     assert recorded.problem.nc >= 1
     solution: Any = fclib.solve(recorded.problem, tol=1e-10).solution
     r = solution.r.reshape(-1, 3)
@@ -405,6 +587,17 @@ def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
     assert r[:, 0].sum() > 0
     assert solution.v[0] < 0.5
     np.testing.assert_allclose(np.hypot(r[:, 1], r[:, 2]), 0.6 * r[:, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("gap", "fall"), [(5e-4, 0.05), (2e-3, 0.0981), (-1e-3, 0.0)])
+def test_a_contact_within_pinocchios_margin_closes_its_gap(gap: float, fall: float) -> None:
+    """A body falls as far as its gap is wide, and freely if it does not reach the floor."""
+    h = 1e-2
+    recorded = pinocchios_box(0.1 + gap, h=h, margin=0.01)
+    assert recorded.problem.nc >= 1
+    np.testing.assert_allclose(recorded.contacts.gap, gap, atol=1e-9)
+    solution: Any = fclib.solve(recorded.problem, tol=1e-10).solution
+    assert solution.v[2] == pytest.approx(-fall, abs=1e-6)
 
 
 def newtons_solver(build: Any, **options: Any) -> tuple[Any, Any]:
@@ -748,7 +941,7 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     assert (list(sys.argv), list(sys.path)) == before
     again = CliRunner().invoke(app, common)
     assert again.exit_code == 1
-    assert "has files already" in " ".join(again.output.split())
+    assert "has steps already; name another folder" in " ".join(again.output.split())
 
 
 # spheres: nothing gyroscopic; the second runs into the first
@@ -1157,7 +1350,7 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
     before = path.read_bytes()
     done = CliRunner().invoke(app, [*words, "--out", str(path)])
     assert done.exit_code == 1
-    assert "has steps already" in done.output
+    assert "is there already; name another file" in " ".join(done.output.split())
     assert path.read_bytes() == before
 
 

@@ -15,8 +15,10 @@ import scipy.sparse as sp
 import fclib
 from fclib import _core, collections
 from fclib.scenes import Scene
+from fclib.scenes.shared.interaction import Course, Drive, Interaction
 from helpers import dense
 from helpers_cli import run as command
+from helpers_simulate import mujoco_of
 
 # MuJoCo has no release for the oldest Python that fclib takes
 mujoco = pytest.importorskip("mujoco")
@@ -454,6 +456,86 @@ def test_a_turned_terrain_holds_a_body() -> None:
     assert np.abs(steps[-1].velocity).max() < 0.5
 
 
+NAMED = '<contact><pair geom1="{}" geom2="box" friction="0.2 0.2" margin="{}"/>{}</contact>'
+
+
+def counted(contacts: Any) -> dict[tuple[int, ...], int]:
+    """The number of contacts of each pair."""
+    pairs, counts = np.unique(np.sort(contacts.pair, axis=1), axis=0, return_counts=True)
+    return dict(zip(map(tuple, pairs.tolist()), counts.tolist(), strict=True))
+
+
+ON_TOP = '<pair geom1="ball" geom2="box" friction="0.3 0.3"/>'
+BALL = '<body pos="0.013 0.007 0.15"><freejoint/><geom name="ball" size="0.05" mass="1"/></body>'
+
+
+@pytest.mark.parametrize("bits", ["", 'contype="0" conaffinity="0"'])
+def test_named_pairs_on_a_terrain_count_once(bits: str) -> None:
+    box = BOX.format(z=0.05, size="0.4 0.4 0.05")
+    plain = MujocoModel(Scene(name="test", xml=terrain(100, box))).assemble(H).contacts
+    assert len(plain) > 1000
+    bodies = box.replace("<geom ", '<geom name="box" ') + BALL
+    named = terrain(100, bodies).replace("<geom ", f"<geom {bits} ")
+    named = named.replace("</worldbody>", "</worldbody>" + NAMED.format("ground", 0, ON_TOP))
+    contacts = MujocoModel(Scene(name="test", xml=named)).assemble(H).contacts
+    assert counted(contacts) == {(0, 1): len(plain), (1, 2): 1}
+    on_field = (contacts.pair == 0).any(axis=1)
+    assert set(contacts.mu[on_field].tolist()) == {0.2}
+    assert contacts.mu[~on_field].tolist() == [0.3]
+
+
+def test_the_margin_of_a_named_pair_reaches_beside_a_body() -> None:
+    """A wall of a terrain beside a box is within the pair's margin."""
+    heights = " ".join("1" if column >= 65 else "0" for column in range(100))
+    field = f'<hfield name="t" elevation="{" ".join([heights] * 100)}" '
+    box = BOX.format(z=0.051, size="0.2 0.2 0.05").replace("<geom ", '<geom name="box" ')
+    named = NAMED.format("ground", 0.15, "")
+    xml = terrain(100, box).replace("</worldbody>", "</worldbody>" + named)
+    model = MujocoModel(Scene(name="test", xml=xml.replace('<hfield name="t" ', field)))
+    contacts = model.assemble(H).contacts
+    assert contacts.gap.max() <= 0.15
+    # the wall begins at x = 0.3, the box ends at 0.213
+    assert ((contacts.point[:, 0] > 0.22) & (np.abs(contacts.frame[:, 0, 0]) > 0.9)).sum() > 10
+
+
+def test_limits_beside_interactions_are_refused() -> None:
+    """The kinds of shapes were asked of limits, which have none."""
+    shape = '<geom name="{}" type="{}" size="0.1 0.1 0.1" mass="1" user="0"/>'
+    limited = "".join(
+        (
+            f'<body pos="0 0 {z}"><joint name="{name}" type="slide" axis="0 0 1" range="0 1"/>'
+            f"{shape.format(name, 'sphere')}</body>"
+        )
+        for name, z in (("low", 0.2), ("high", 0.4))
+    )
+    xml = document(shape.format("ground", "box").replace(" mass", ' pos="0 0 0" mass') + limited)
+    one = Interaction(kinds=(0, 0), mu=0.3, alert=0.05, law="IQS_CLB")
+    scene = Scene(name="both", xml=xml, law="gap", interactions=(one,))
+    with pytest.raises(UnsupportedSceneError, match="both: joint low has limits, for which no law"):
+        MujocoModel(scene)
+    ignoring = dataclasses.replace(scene, ignore=("limits",))
+    (step,) = simulate(ignoring, 1)
+    assert step.contacts.mu.tolist() == [0.3, 0.3]
+
+
+def test_named_pairs_of_stones_count_once() -> None:
+    """Equal stones, each turned a little, so that MuJoCo keeps four points of eight corners."""
+    box = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+    asset = f'<asset><mesh name="stone" scale=".1 .1 .1" vertex="{box}"/></asset>'
+    stones = (
+        '<geom name="ground" type="mesh" mesh="stone" pos="0 0 -0.1"/>'
+        '<body pos="0 0 0.1" euler="0 0 45"><freejoint/>'
+        '<geom name="box" type="mesh" mesh="stone"/></body>'
+        '<body pos="0 0 0.25"><freejoint/><geom name="ball" size="0.05" mass="1"/></body>'
+    )
+    plain, named = (
+        MujocoModel(Scene(name="test", xml=document(stones, asset + rest))).assemble(H).contacts
+        for rest in ("", NAMED.format("ground", 0, ON_TOP))
+    )
+    assert counted(plain) == counted(named) == {(0, 1): 8, (1, 2): 1}
+    assert sorted(set(named.mu.tolist())) == [0.2, 0.3]
+
+
 # ---- what a file asks too much
 
 URDF = """<robot name="finger">
@@ -711,6 +793,70 @@ def test_a_table_that_is_no_log_is_said(text: str, word: str, tmp_path: Path) ->
     (tmp_path / "log.npz").write_text("no", encoding="utf-8")
     with pytest.raises(ValueError, match=r"log.npz: is no \.npz file"):
         logged(tmp_path / "log.npz", MujocoModel(Scene(name="pushed", xml=PUSHED)))
+
+
+# ---- states with the time and controls
+
+DRIVEN = (
+    Drive(dof=0, velocity=True, course=Course(amplitude=0.5, omega=20.0)),
+    Drive(dof=2, velocity=False, course=Course(ramp=0.0, ramp_rate=50.0, constant=3.0)),
+)
+
+
+@pytest.fixture
+def driven() -> Scene:
+    """A driven box that is pushed by a servo too, and a ball under a force that grows."""
+    return Scene(name="driven", xml=PUSHED, drives=DRIVEN)
+
+
+def test_a_driven_state_holds_the_time_and_the_controls(driven: Scene) -> None:
+    def control(time: float, state: Any) -> list[float]:
+        return [0.2 + time]
+
+    steps = list(simulate(driven, 6, control=control))
+    m = mujoco_of(steps[0])
+    assert len(steps[4].position) == m.nq + 1 + m.nu
+    np.testing.assert_allclose(steps[4].position[m.nq :], [4 * H, 0.2 + 4 * H], rtol=1e-12)
+    # a new model makes the same problem of the state alone
+    model = MujocoModel(driven)
+    scheme = module.scheme_of(model)
+    for step in steps:
+        part = module.problem_at(model, scheme, step.position, step.start.velocity)
+        assert fclib.digest(part.problem) == fclib.digest(step.problem)
+    # without controls the state has none
+    (step,) = simulate(driven, 1)
+    assert len(step.position) == m.nq + 1
+    # and a simulation goes on from it
+    again = list(simulate(driven, 3, control=control, start=steps[3].start))
+    for one, other in zip(again, steps[3:], strict=True):
+        assert fclib.digest(one.problem) == fclib.digest(other.problem)
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv"])
+def test_a_log_of_a_driven_scene_has_the_time(
+    kind: str, driven: Scene, log: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / f"log.{kind}"
+    times = 0.1 + H * np.arange(10)
+
+    def write(**more: Any) -> None:
+        if kind == "npz":
+            np.savez(path, **log, **more)
+        else:
+            path.write_text(as_csv(log | more).replace("time0", "time"), encoding="utf-8")
+
+    model = MujocoModel(driven)
+    write()
+    word = "log.* has no time, on which the drives of driven depend"
+    with pytest.raises(ValueError, match=word):
+        logged(path, model)
+    write(time=times if kind == "npz" else times[:, None])
+    position, velocity = logged(path, model)
+    both = np.hstack((log["qpos"], times[:, None], log["ctrl"]))
+    np.testing.assert_array_equal(position, both)
+    model.set_state(position[7], velocity[7])
+    assert model.data.time == times[7]
+    np.testing.assert_array_equal(model.data.ctrl, log["ctrl"][7])
 
 
 def test_the_part_of_a_change_that_moves_bodies_is_the_least_that_does() -> None:

@@ -334,7 +334,7 @@ def test_verify_says_by_how_much_a_problem_differs(
         assert dict(verdict.differences) == {"f": pytest.approx(share, rel=1e-15 / share)}
     told = invoke("collection", "verify", tmp_path)
     assert told.exit_code == int(status != "ok")
-    words = {"published": "have the data of the published version", "differs": "1 problems differ"}
+    words = {"published": "have the data of the published version", "differs": "1 problem differs"}
     assert words[origin] in told.output
 
 

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 import fclib
 import helpers_cli
-from fclib import analysis
+from fclib import analysis, recorders
 from helpers import dense, planted_global, planted_local
 
 
@@ -286,3 +286,21 @@ def test_vectors_that_were_never_written_are_absent(tmp_path: Path, form: str) -
     # it gives way to one
     fclib.write_solution(path, case.solution)
     assert fclib.read_solution(path) is not None
+
+
+def test_one_thing_is_no_plural(tmp_path: Path) -> None:
+    """Messages with a number of things agree with it."""
+    recording = recorders.Recording(tmp_path / "steps")
+
+    def wrong() -> None:
+        raise ValueError("a number is not finite")
+
+    recording.take(wrong)
+    assert recording.without.startswith("left out of 1 step: number 0. Of number 0: a number")
+    with fclib.SequenceWriter(tmp_path / "one.h5") as writer:
+        writer.append(planted_local(1, nc=2).problem)
+    assert repr(fclib.Sequence(tmp_path / "one.h5")).endswith("one.h5: 1 step>")
+    with pytest.raises(fclib.FileError, match="has 1 step; the first is number 0"):
+        fclib.read(f"{tmp_path / 'one.h5'}#3")
+    result = fclib.solve(planted_local(1, nc=5).problem, "nsgs", tol=1e-15, max_iterations=1)
+    assert ", 1 iteration, " in repr(result)

@@ -27,8 +27,9 @@ std::unique_ptr<StepFile> step_of(const Group& root, std::size_t step) {
   }
   const StoredSequence sequence(root);
   if (step >= sequence.size()) {
+    const std::string steps = sequence.size() == 1 ? " step" : " steps";
     fail(root.child(sequence_group),
-         "has " + std::to_string(sequence.size()) + " steps; the first is number 0");
+         "has " + std::to_string(sequence.size()) + steps + "; the first is number 0");
   }
   return sequence.step(step);
 }

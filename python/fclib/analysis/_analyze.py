@@ -11,6 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.csgraph import connected_components
 
 from fclib import _core, _digest, _laws, _solve
+from fclib._words import counted
 from fclib.analysis._bounds import least_singular, lower_bound
 from fclib.analysis._certificate import Certificate
 from fclib.analysis._data import (
@@ -517,7 +518,7 @@ def _units(data: Data, verdict: Existence) -> Units:
     if ratio > SPREAD:
         trouble.append(f"mass ratio of {ratio:.1e} between contacts")
     if held.size < nc:
-        trouble.append(f"{nc - held.size} contacts that nothing can move (W_aa = 0)")
+        trouble.append(f"{counted(nc - held.size, 'contact')} that nothing can move (W_aa = 0)")
     if prestress > FAR:
         trouble.append(f"prestress: reactions {prestress:.1e} times what stops the velocity")
     guess = f"masses of about {mass:.1e} kg and velocities of about {velocity:.1e} m/s, if SI"

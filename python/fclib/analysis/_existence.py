@@ -27,6 +27,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
 from fclib import _core, _laws, _solve
+from fclib._words import counted
 from fclib.analysis._certificate import Certificate, CertificateError, check, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
@@ -354,7 +355,7 @@ def existence(
     if proof is not None:
         which = "no reactions" if proof.exact else f"no reactions of a norm below {proof.bound:.1e}"
         how = "in exact arithmetic" if proof.exact else "W being rounded in its last digits"
-        reason = f"{which} keep {proof.contacts} contacts from closing (Farkas, {how})"
+        reason = f"{which} keep {counted(proof.contacts, 'contact')} from closing (Farkas, {how})"
         return Existence(PROVEN_NOT, reason, proof, None, error)
     if states is not None and refuted:
         return Existence(PROVEN_NOT, states.reason, None, None, error)

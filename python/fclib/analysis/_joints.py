@@ -23,6 +23,7 @@ from scipy.linalg import qr
 from scipy.sparse.csgraph import connected_components
 
 from fclib import _laws
+from fclib._words import counted
 from fclib.analysis._bounds import dot, exact_rows, least_singular, root_above
 from fclib.analysis._data import DENSE, Array, Data
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError
@@ -124,7 +125,7 @@ def joints_of_rows(B: sp.csr_array, e: Array, time_limit: float = EXACT) -> Join
         own = scaled[rows]
         own = own[:, np.flatnonzero(np.diff(sp.csc_array(own).indptr))]
         if max(own.shape) > DENSE:
-            unknown = f"a loop of {rows.size} rows of joints is too large to be decided"
+            unknown = f"a loop of {counted(rows.size, 'row')} of joints is too large to be decided"
             continue
         if rows.size <= own.shape[1] and (bound := least_singular(own)) > 0:
             kept += rows.tolist()
@@ -133,7 +134,9 @@ def joints_of_rows(B: sp.csr_array, e: Array, time_limit: float = EXACT) -> Join
         try:
             rank, combination = _eliminated(B[rows], e[rows], end)
         except LateError:
-            unknown = f"no time was left to decide whether {rows.size} rows of joints agree"
+            unknown = (
+                f"no time was left to decide whether {counted(rows.size, 'row')} of joints agree"
+            )
             continue
         if combination:
             named = {int(rows[k]): value for k, value in combination.items()}

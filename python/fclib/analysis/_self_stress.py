@@ -36,6 +36,7 @@ from scipy.linalg import qr
 from scipy.sparse.linalg import lsmr, spsolve
 
 from fclib import _laws
+from fclib._words import counted
 from fclib.analysis._bounds import (
     Exact,
     below,
@@ -234,7 +235,10 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     columns = [*sorted(columns), *range(own, own + extra)]
     x = _in_kernel(B[:, columns], y[columns])
     if x is None:
-        return None, f"reactions of {kept.size} contacts move nothing up to rounding, no proof"
+        return (
+            None,
+            f"reactions of {counted(kept.size, 'contact')} move nothing up to rounding, no proof",
+        )
     values, off = x
     place = dict(zip(columns, values, strict=True))
     margins = []
@@ -248,13 +252,16 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
         margins.append(r[0] - Fraction(off))
     least = min(margins)
     if least < 0 or not any(place[d * a] > Fraction(off) for a in kept.tolist()):
-        return None, f"reactions of {kept.size} contacts move nothing up to rounding, no proof"
+        return (
+            None,
+            f"reactions of {counted(kept.size, 'contact')} move nothing up to rounding, no proof",
+        )
     r_bar = np.zeros(own)
     for k, value in place.items():
         if k < own:
             r_bar[k] = float(value)
     how = "in exact arithmetic" if off == 0 else f"some within {off:.1e} of these doubles"
-    reason = f"reactions of {kept.size} contacts move nothing, {how}"
+    reason = f"reactions of {counted(kept.size, 'contact')} move nothing, {how}"
     return SelfStress(
         PRESTRESSED, reason, r_bar, max(0.0, below(least)) / float(np.linalg.norm(r_bar))
     ), ""

@@ -14,6 +14,7 @@ import numpy as np
 from fclib import _core, _digest, _sequence
 from fclib._origin import origin_of
 from fclib._regular import resolved
+from fclib._words import counted
 from fclib.bench.job import ProblemFacts
 
 T = TypeVar("T")
@@ -73,8 +74,8 @@ def files_of(
             left.add(path)
     if left:
         tell(
-            f"left out: {len(left)} files, the first is {min(left)}; each has the {dropped}"
-            f' form of a problem whose {kept} form is run; form = "both" runs both'
+            f"left out: {counted(len(left), 'file')}, the first is {min(left)}; each has the"
+            f' {dropped} form of a problem whose {kept} form is run; form = "both" runs both'
         )
     return [path for path in found if path not in left]
 
@@ -140,7 +141,7 @@ def now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int,
         nonlocal last_told
         if time.monotonic() - last_told >= PATIENCE:
             last_told = time.monotonic()
-            tell(f"{which}: {name}, {done} of {total} problems")
+            tell(f"{which}: {name}, {done} of {counted(total, 'problem')}")
 
     return show
 

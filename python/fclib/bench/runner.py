@@ -15,6 +15,7 @@ import numpy as np
 
 from fclib import _core
 from fclib._verdicts import SOLVED, is_solved
+from fclib._words import counted
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Guess, Job, Record, Runner
@@ -289,8 +290,8 @@ def run_campaign(
                             queue.leave(job, record)
                             if queue.failed >= queue.many:
                                 progress.stopped = (
-                                    f"stopped: {queue.failed} of {len(left)} runs could not be"
-                                    f" done, the last one was {progress.reason}"
+                                    f"stopped: {queue.failed} of {counted(len(left), 'run')} could"
+                                    f" not be done, the last one was {progress.reason}"
                                 )
                                 queue.stop()
                                 break

@@ -37,6 +37,7 @@ import numpy as np
 
 from fclib import _core
 from fclib._solve import MERITS
+from fclib._words import counted
 from fclib.bench import machine, processes
 from fclib.bench.job import KEPT, ORDERLY, STATUSES, SURROUNDINGS, Record
 from fclib.bench.meter import Meter
@@ -673,7 +674,7 @@ def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
         record.message = f"said that there is no solution, and proved nothing: {one_line(error)}"
         return
     record.certificate = json.dumps(proof.record(problem))
-    record.message = f"proven, on {proof.contacts} of {problem.nc} contacts"
+    record.message = f"proven, on {proof.contacts} of {counted(problem.nc, 'contact')}"
     if not proof.exact:
         record.message += f", for reactions up to {proof.bound:.1e}"
 

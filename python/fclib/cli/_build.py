@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from fclib import collections, scenes
+from fclib._words import counted
 from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
 from fclib.collections import catalog, trajectory
@@ -97,14 +98,16 @@ def build_plans(
         if open_ones:
             worst = max(open_ones, key=lambda row: float(row["error"]))
             out.print(
-                f"{len(open_ones)} problems have no known solution; the best iterate of each is a"
-                f" guess in its file. The worst is {worst['id']}, error {worst['error']:.1e}."
+                f"{counted(len(open_ones), 'problem has', 'problems have')} no known solution; the"
+                f" best iterate of each is a guess in its file. The worst is {worst['id']}, error"
+                f" {worst['error']:.1e}."
             )
         other = [row["id"] for row in rows if collections.origin_of(row) == "differs"]
         if other:
             out.print(
-                f"{len(other)} problems differ from the published ones, as {', '.join(other[:3])}:"
-                f" fclib collection verify {folder} says by how much"
+                f"{counted(len(other), 'problem differs', 'problems differ')} from the published"
+                f" ones, as {', '.join(other[:3])}: fclib collection verify {folder} says"
+                " by how much"
             )
         brief = [plan for plan in plans if plan.references and not plan.analyze]
         if rows and brief:
@@ -139,8 +142,9 @@ def steps_of(plan: collections.Plan, folder: Path) -> list[str]:
     lines = []
     if numbers := origin.get("unsolved"):
         lines.append(
-            f"{plan.name}: {len(numbers)} steps were not solved to {plan.simulation.tol:g}, and the"
-            f" simulation went on with the best that was found: {spans(numbers)}"
+            f"{plan.name}: {counted(len(numbers), 'step was', 'steps were')} not solved to"
+            f" {plan.simulation.tol:g}, and the simulation went on with the best that was"
+            f" found: {spans(numbers)}"
         )
     if word := origin.get("stopped"):
         lines.append(f"Stopped: {word}; the steps before are stored")

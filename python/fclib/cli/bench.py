@@ -17,6 +17,7 @@ import fclib
 from fclib import bench
 from fclib._regular import resolved
 from fclib._verdicts import is_solved
+from fclib._words import counted
 from fclib.bench import machine
 from fclib.bench.campaign import SET
 from fclib.bench.runner import RETRIES
@@ -383,4 +384,4 @@ def export(
         fail(f'{error}; pip install "fclib[bench]"')
     except fclib.Error as error:
         fail(str(error))
-    out.print(f"{table}: {count} runs", highlight=False)
+    out.print(f"{table}: {counted(count, 'run')}", highlight=False)

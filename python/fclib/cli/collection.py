@@ -17,6 +17,7 @@ from fclib import collections
 from fclib._judge import TOLERANCE
 from fclib._regular import reason_of, regular, resolved
 from fclib._verdicts import CLASSES
+from fclib._words import counted
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -407,24 +408,29 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         if report.records:
             out.print(Rows(report.records))
         out.print(
-            f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
+            f"{counted(files, 'file')}, {files - bad} as the catalogue says"
+            + (f", {bad} not" if bad else "")
         )
         if lacking:
-            out.print(f"{lacking} files or families are not in the catalogue, or not whole")
+            lost = counted(lacking, "file or family is", "files or families are")
+            out.print(f"{lost} not in the catalogue, or not whole")
         proven = sum(map(catalog.is_proven, rows))
         unsolved = sum(row["has_solution"] is False for row in rows) - proven
         if proven:
-            out.print(f"{proven} problems are proven to have no solution, and say so")
+            told = counted(proven, "problem is proven", "problems are proven")
+            out.print(f"{told} to have no solution: the files say so")
         if unsolved:
-            out.print(f"{unsolved} problems have no known solution, and say so")
+            told = counted(unsolved, "problem has", "problems have")
+            out.print(f"{told} no known solution: the files say so")
         phrases = {
-            "published": "have the data of the published version",
-            "differs": "differ from the published version",
-            "yours": "are yours: no published trajectory or list has them",
+            "published": ("has", "have", "the data of the published version"),
+            "differs": ("differs", "differ", "from the published version"),
+            "yours": ("is yours", "are yours", "and in no published trajectory or list"),
         }
-        for origin, words in phrases.items():
+        for origin, (one, many, words) in phrases.items():
             if origins[origin]:
-                out.print(f"{origins[origin]} problems {words}")
+                told = counted(origins[origin], f"problem {one}", f"problems {many}")
+                out.print(f"{told} {words}")
     raise typer.Exit(int(report.failed))
 
 
@@ -472,7 +478,7 @@ def find(
     if not (as_json or files):
         if rows:
             out.print(Rows(report.records))
-        told = f"{len(rows)} of {table.num_rows} problems"
+        told = f"{len(rows)} of {counted(table.num_rows, 'problem')}"
         if (different := catalog.distinct(rows)) < len(rows):
             told += f", {different} of them distinct"
         out.print(told)
@@ -519,15 +525,16 @@ def status(
         return
     if basis is None:
         fail(
-            f"{name}: no published run is of its {len(rows)} problems; the package fclib-results"
-            " has the runs, and fclib results pack adds those of a store"
+            f"{name}: no published run is of its {counted(len(rows), 'problem')}; the package"
+            " fclib-results has the runs, and fclib results pack adds those of a store"
         )
     out.print(f"Classes {basis}", highlight=False)
     if only is not None or every:
         if wanted:
             out.print(Rows([record_of(row) for row in wanted]))
         else:
-            out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
+            of = counted(len(rows), "problem")
+            out.print(f"None of {of} of {name} is {only.value if only else ''}")
         return
     families: dict[str, Counter[str]] = {}
     limits: dict[str, set[float]] = {}

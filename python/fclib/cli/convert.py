@@ -13,6 +13,7 @@ import typer
 
 import fclib
 from fclib import _laws, _sequence
+from fclib._files import is_open_or_device
 from fclib.cli._files import contents_of
 from fclib.cli._output import Json, Report, each_file, err, usage_error
 
@@ -153,6 +154,8 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
     Raises:
         fclib.Error: a file or its problem is faulty, or the conversion is impossible.
     """
+    if is_open_or_device(target):
+        raise fclib.FileError(f"{target}: is a device or a pipe; name a file to be written")
     if target.exists() and not request.force:
         raise fclib.FileError(f"{target}: is there already; --force replaces it")
     given = read(source, request.kind)

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from fclib import bench, demo
+from fclib._words import counted
 from fclib.cli._output import (
     Json,
     Report,
@@ -78,7 +79,9 @@ def command(
         fail(str(error))
 
     say = err if as_json else out
-    say.print(f"Simulating {boxes} boxes that fall on the ground, {steps} steps ...")
+    say.print(
+        f"Simulating {counted(boxes, 'falling box', 'falling boxes')}, {counted(steps, 'step')} ..."
+    )
     paths: list[Path] = []
     picture: Path | None = out_dir / "stack.png"
     with progress_bar(steps) as show:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from fclib._words import counted
 from fclib.cli._output import err, fail, out
 
 
@@ -67,7 +68,9 @@ def command(
         )
     except (ImportError, OSError, ValueError) as error:
         fail(str(error))
-    out.print(f"{recording.written} of {recording.seen} steps, in {target}", highlight=False)
+    out.print(
+        f"{recording.written} of {counted(recording.seen, 'step')}, in {target}", highlight=False
+    )
     if recording.without:
         err.print(f"{script}: {recording.without}", highlight=False)
     elif not recording.written:

@@ -144,7 +144,7 @@ def command(
         if counts["copies"]:
             told += f" and {counted(counts['copies'], 'copy', 'copies')}"
         out.print(
-            f"{told}, {counts['runs']} runs, {counts['views']} views,"
+            f"{told}, {counted(counts['runs'], 'run')}, {counted(counts['views'], 'view')},"
             f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
             highlight=False,
         )

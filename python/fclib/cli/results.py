@@ -10,6 +10,7 @@ import typer
 
 import fclib
 from fclib import bench, results
+from fclib._words import counted
 from fclib.bench.calibration import calibration_in
 from fclib.cli._output import Json, Report, Rows, err, fail, out, words_of
 
@@ -30,11 +31,14 @@ def folder_of(where: Path | None) -> Path:
 
 
 def parts_of(where: Path | None) -> list[results.Shard]:
-    """The parts; the command ends if one is damaged."""
+    """The parts; the command ends if one is damaged, or a folder is named that has none."""
     try:
-        return results.shards(folder_of(where))
+        found = results.shards(folder_of(where))
     except (ImportError, fclib.Error) as error:
         fail(str(error))
+    if where is not None and not found:
+        fail(f"{where}: {'has no part, *.parquet' if where.is_dir() else 'is no folder of parts'}")
+    return found
 
 
 @app.command("list")
@@ -191,7 +195,7 @@ def unpack(
         fail(str(error))
     except OSError as error:
         fail(words_of(error))
-    out.print(f"{store}: {count} runs are new", highlight=False)
+    out.print(f"{store}: {counted(count, 'run is new', 'runs are new')}", highlight=False)
 
 
 @app.command()

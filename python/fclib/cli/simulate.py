@@ -11,6 +11,7 @@ import typer
 
 from fclib import collections, scenes
 from fclib._sequence import SUFFIXES
+from fclib._words import counted
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -290,7 +291,7 @@ def command(
     if rigid and rigid.keyframe and not is_deck:
         err.print(f"From the keyframe {rigid.keyframe!r}", highlight=False)
     doing = f"Simulating {loaded.name}" if states is None else f"{states}: {loaded.name}"
-    err.print(f"{doing}, {steps} steps ...", highlight=False)
+    err.print(f"{doing}, {counted(steps, 'step')} ...", highlight=False)
     if sequence is None:
         build_plans([plan], target, 1, pictures, as_json)
     else:

@@ -11,6 +11,7 @@ import typer
 
 import fclib
 from fclib import _sequence
+from fclib._files import is_open_or_device
 from fclib.cli._files import contents_of
 from fclib.cli._output import err, fail, out
 
@@ -70,7 +71,8 @@ def command(
         view.write_view(record, path, file.name, panel)
     except fclib.Error as error:
         fail(str(error))
-    out.print(str(path), highlight=False)
+    if not is_open_or_device(path):
+        out.print(str(path), highlight=False)
     if target is None and not webbrowser.open(path.resolve().as_uri()):
         err.print("There is no browser here; open the page in one.", highlight=False)
 

@@ -35,6 +35,7 @@ from fclib import _core, _digest, _laws, _solve, scenes
 from fclib._files import write_text
 from fclib._judge import TOLERANCE, trivial
 from fclib._origin import origin_of
+from fclib._words import counted
 from fclib.collections import catalog, ratings, references, trajectory
 from fclib.collections.catalog import STATE
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
@@ -280,7 +281,8 @@ def states_of(plan: Plan, folder: Path, report: Progress) -> trajectory.Trajecto
     if plan.problems is not None and plan.steps is None:
         last = int(states.number.max(initial=-1))
         if last + 1 < plan.problems:
-            raise BuildError(f"{path}: has {last + 1} problems, and {plan.problems} are asked for")
+            has = counted(last + 1, "problem")
+            raise BuildError(f"{path}: has {has}, and {plan.problems} are asked for")
     # a local file may refer to others beside it
     return replace(states, scene=replace(states.scene, path=plan.scene.path))
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from fclib._files import replace_file
 from fclib._words import counted
 from fclib.collections.handed import drawing
 
@@ -107,5 +109,6 @@ def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: st
         axes[0].yaxis.set_major_locator(whole(nbins=5, integer=True))
         figure.suptitle(f"{title}: {counted(len(rows), 'problem')}", fontsize=10)
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
-            figure.savefig(folder / f"distribution{suffix}", dpi=160, metadata=metadata)
+            save = partial(figure.savefig, format=suffix[1:], dpi=160, metadata=metadata)
+            replace_file(folder / f"distribution{suffix}", save)
             figure.set_layout_engine("none")  # fixes the place of the axes

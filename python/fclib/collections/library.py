@@ -13,6 +13,7 @@ from typing import Any, overload
 
 from fclib import _core
 from fclib._solve import Problem
+from fclib._words import counted
 from fclib.collections import archives, catalog, published, set_index
 from fclib.collections.build import Progress, build
 
@@ -203,7 +204,9 @@ class Collection(Sequence[Problem]):
                 raise KeyError(f"{self.name} has no problem {which!r}{first}")
             which = places[which]
         if not -len(self) <= which < len(self):
-            raise IndexError(f"{self!r} has {len(self)} problems, and none of number {which}")
+            raise IndexError(
+                f"{self!r} has {counted(len(self), 'problem')}, and none of number {which}"
+            )
         for name in (form,) if form else FORMS:
             file: str | None = self.catalog[f"{name}_file"][which].as_py()
             if file is not None:

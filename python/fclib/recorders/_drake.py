@@ -8,6 +8,9 @@ contacts; "sap" is what Drake's solver minimises: compliant, dissipative and ass
     k = kA kB / (kA + kB),  tau = tauA + tauB,  beta = 1, sigma = 1e-3
     R_N = max(beta^2 W / (4 pi^2), 1 / (h k (h + tau))),  R_T = sigma W,  W = ||W_cc|| / 3
 
+The forces of actuators are those that Drake applies: within their limits, those of controllers
+with gains too. Constraints and locked joints are not recorded.
+
 Castro, Permenter & Han, "An unconstrained convex formulation of compliant contact" (2023).
 """
 
@@ -15,15 +18,16 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from fclib import _core
 from fclib.recorders._assemble import Contacts, Limits, assemble
-from fclib.recorders._recorded import Recorded, SetupError
+from fclib.recorders._recorded import Recorded, SetupError, checked
 
 BETA, SIGMA = 1.0, 1e-3  # SAP's parameters of near rigid contacts, and of stiction
+SOLVED: Final = 1e-4  # relative error of velocities that SAP's tolerance explains
 
 
 def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Recorded:
@@ -36,22 +40,30 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
 
     Raises:
         ImportError: Drake is not installed.
-        ValueError: the plant is continuous, or a geometry has no stiffness for "sap".
+        ValueError: the plant is continuous, has sampled output, constraints, locked joints or
+            contacts that are no points; for "sap", a geometry has no stiffness, or a joint is at
+            its limit.
     """
     drakes: Any = importlib.import_module("pydrake.all")
     h = plant.time_step()
     if not h > 0:
         raise SetupError("the plant is continuous: it has no discrete steps")
+    refuse(plant, context)
     n = plant.num_velocities()
     world = plant.world_frame()
     v0 = np.array(plant.GetVelocities(context))
     M = plant.CalcMassMatrix(context)
     forces = drakes.MultibodyForces(plant)
     plant.CalcForceElementsContribution(context, forces)
+    port = plant.get_applied_spatial_force_input_port()
+    for one in port.Eval(context) if port.HasValue(context) else ():
+        body = plant.get_body(one.body_index)
+        arm = body.EvalPoseInWorld(context).rotation().matrix() @ one.p_BoBq_B
+        body.AddInForce(context, arm, one.F_Bq_W, world, forces)
     tau = plant.CalcGeneralizedForces(context, forces)
-    port = plant.get_actuation_input_port()
-    if plant.num_actuated_dofs() and port.HasValue(context):
-        tau = tau + plant.MakeActuationMatrix() @ port.Eval(context)
+    if plant.num_actuated_dofs():
+        net = plant.get_net_actuation_output_port().Eval(context)
+        tau = tau + plant.MakeActuationMatrix() @ net
     port = plant.get_applied_generalized_force_input_port()
     if port.HasValue(context):
         tau = tau + port.Eval(context)
@@ -68,6 +80,12 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
     query = plant.get_geometry_query_input_port().Eval(context)
     inspector = query.inspector()
     pairs = query.ComputePointPairPenetration()
+    results = plant.get_contact_results_output_port().Eval(context)
+    others = results.num_hydroelastic_contacts() + results.num_deformable_contacts()
+    if others or results.num_point_pair_contacts() != len(pairs):
+        raise ValueError(
+            "contacts of surfaces are not recorded: set the plant's contact model to kPoint"
+        )
     rows, mu, points, frames, bodies, w, material = [], [], [], [], [], [], []
     for pair in pairs:
         sides = [
@@ -129,10 +147,12 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
         bodies=np.reshape(bodies, (nc, 2)).astype(np.int64),
         gap=-np.array([pair.depth for pair in pairs]),
     )
-    limits = _limits(plant, context, v0, h) if law == "hard" else None
+    limits = _limits(plant, context, v0, h)
+    if limits is not None and law == "sap":
+        raise ValueError('a joint is at its limit, which is recorded by the law "hard" only')
     count = 0 if limits is None else len(np.asarray(limits.w))
-    guess = _reaction(plant, context, contacts, pairs, h, count)
-    return Recorded(
+    guess = _reaction(results, contacts, pairs, h, count)
+    recorded = Recorded(
         assembled=assemble(A, v_free, h, contacts, limits=limits, compliance=compliance),
         engine="Drake",
         version=importlib.metadata.version("drake"),
@@ -156,6 +176,23 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
         contacts=contacts,
         more={"associated": law == "sap"},
     )
+    # the reaction of a limit is not told
+    return recorded if limits is not None else checked(recorded, SOLVED)
+
+
+def refuse(plant: Any, context: Any) -> None:
+    """Raise SetupError or ValueError if a step has what is not recorded."""
+    if plant.has_sampled_output_ports():
+        raise SetupError(
+            "the plant's output is that of the last step: call SetUseSampledOutputPorts(False)"
+            " before Finalize"
+        )
+    if any(plant.GetConstraintActiveStatus(context, one) for one in plant.GetConstraintIds()):
+        raise SetupError("the plant has constraints, and only joints are recorded")
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if joint.is_locked(context):
+            raise ValueError(f"joint {joint.name()} is locked, which is not recorded")
 
 
 def _material(inspector: Any, identifier: Any) -> tuple[float, float, float]:
@@ -196,10 +233,9 @@ def _limits(plant: Any, context: Any, v0: Any, h: float) -> Limits | None:
 
 
 def _reaction(
-    plant: Any, context: Any, contacts: Contacts, pairs: Any, h: float, limits: int
+    results: Any, contacts: Contacts, pairs: Any, h: float, limits: int
 ) -> _core.Solution | None:
     """Drake's own impulses, in the order of the problem's contacts."""
-    results = plant.get_contact_results_output_port().Eval(context)
     assert contacts.frame is not None
     r = np.zeros((len(contacts) + limits, 3))
     place = {(int(p.id_A.get_value()), int(p.id_B.get_value()), i): i for i, p in enumerate(pairs)}

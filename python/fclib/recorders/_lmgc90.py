@@ -36,6 +36,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fclib import _core
+from fclib._words import counted
 from fclib.recorders._assemble import Assembled, Contacts, Vector
 from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, SetupError, no_step
 from fclib.scenes.shared import deck as decks
@@ -164,7 +165,7 @@ def makers_of(source: Source, every: int) -> Iterator[tuple[State, Maker]]:
     if ran.returncode:
         raise ChildProcessError(
             f"{source.path}: LMGC90's engine ended with status {ran.returncode} after"
-            f" {len(files)} steps; what it said is above"
+            f" {counted(len(files), 'step')}; what it said is above"
         )
 
 
@@ -205,8 +206,6 @@ def write_deck(path: Path, source: Source) -> tuple[str, ...]:
         arrays[f"driven_{i}"] = np.array(
             [drive.body[1], drive.axis, drive.velocity, bool(course.points)]
         )
-        if len(course.points) == 1:
-            drive.place.fail("the engine takes evolutions of two points at least")
         arrays[f"values_{i}"] = (
             np.array(course.points).T.ravel()
             if course.points
@@ -274,7 +273,7 @@ def solid(deck: Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
         contactor.place.fail("a SPHER; the engine of compas_lmgc90 takes POLYR and PLANx only")
     if contactor.kind == "PLANx":
         corners, faces = polyhedron.box_surface(np.array(contactor.size))
-        local = corners + origin
+        local = corners @ (one.turn @ contactor.turn).T + origin
     else:
         local, faces = vertices, contactor.faces
         try:

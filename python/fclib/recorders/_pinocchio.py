@@ -36,7 +36,7 @@ def pinocchio(
         tau: forces of the actuators (n); None: 0.
         h: time step [s].
         mu: coefficient of friction: Pinocchio's geometries have none.
-        margin: pairs closer than this touch [m].
+        margin: pairs closer than this may touch within the step [m].
 
     Raises:
         ImportError: pinocchio is not installed.
@@ -80,8 +80,11 @@ def pinocchio(
             points.append(point)
             frames.append(frame)
             pairs.append(joints)
+            # coal's depth is a signed distance
             gaps.append(contact.penetration_depth)
     nc = len(rows)
+    approach = np.zeros((nc, 3))
+    approach[:, 0] = np.maximum(gaps, 0) / h
     low, high = model.lowerPositionLimit, model.upperPositionLimit
     own, w = [], []
     for joint in model.joints:
@@ -97,9 +100,11 @@ def pinocchio(
     contacts = Contacts(
         jacobian=np.reshape(rows, (3 * nc, n)),
         mu=np.full(nc, mu),
+        w=approach.ravel(),
         point=np.reshape(points, (nc, 3)),
         frame=np.reshape(frames, (nc, 3, 3)),
         bodies=np.reshape(pairs, (nc, 2)).astype(np.int64),
+        gap=np.array(gaps, dtype=float),
     )
     limits = Limits(jacobian=np.array(own), w=w) if own else None
     return Recorded(
@@ -118,7 +123,6 @@ def pinocchio(
             "mu": "reconstructed",
         },
         contacts=contacts,
-        more={"gaps": gaps},
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fclib import _core
 from fclib.recorders._assemble import Contacts, assemble
-from fclib.recorders._recorded import Recorded, SetupError
+from fclib.recorders._recorded import EXACT, Recorded, SetupError, checked
 
 
 def pybullet(client: int, bodies: Sequence[int] | None = None, h: float | None = None) -> Recorded:
@@ -24,11 +24,12 @@ def pybullet(client: int, bodies: Sequence[int] | None = None, h: float | None =
     Args:
         client: result of `pybullet.connect`.
         bodies: the bodies that move; by default all with a mass.
-        h: time step [s]; by default the engine's.
+        h: time step [s], the engine's own.
 
     Raises:
         ImportError: pybullet is not installed.
-        ValueError: a body has joints: joints are not supported yet.
+        ValueError: h is another one, or a step has parts: substeps, joints, constraints, bodies
+            that move and are not among `bodies`, or contacts that resist rolling or spin.
     """
     return record(importlib.import_module("pybullet"), client, bodies, h)
 
@@ -42,8 +43,16 @@ def record(
         every = [p.getBodyUniqueId(i, **options) for i in range(p.getNumBodies(**options))]
         bodies = [body for body in every if p.getDynamicsInfo(body, -1, **options)[0] > 0]
     engine = p.getPhysicsEngineParameters(**options)
-    h = engine["fixedTimeStep"] if h is None else h
+    if h is not None and h != engine["fixedTimeStep"]:
+        raise SetupError(f"the engine's step is {engine['fixedTimeStep']:g} s, not {h:g}")
+    h = float(engine["fixedTimeStep"])
+    if engine["numSubSteps"] > 1:
+        raise SetupError("a step of several substeps, of which Bullet tells the last contacts only")
     gravity = np.array([engine[f"gravityAcceleration{axis}"] for axis in "XYZ"])
+    for i in range(p.getNumConstraints(**options)):
+        known = p.getConstraintInfo(p.getConstraintUniqueId(i, **options), **options)
+        if known[0] in bodies or known[2] in bodies:
+            raise ValueError(f"constraint {i}: bodies without constraints are recorded")
     n = 6 * len(bodies)
     place = {body: 6 * i for i, body in enumerate(bodies)}
     M, v0, v_free = np.zeros((n, n)), np.zeros(n), np.zeros(n)
@@ -87,11 +96,16 @@ def record(
                 J[:, i : i + 3] += sign * frame
                 J[:, i + 3 : i + 6] += sign * np.cross(arm, frame)
         rows.append(J)
-        friction = [
-            p.getDynamicsInfo(body, link, **options)[1]
+        own = [
+            p.getDynamicsInfo(body, link, **options)
             for body, link in ((a, contact[3]), (b, contact[4]))
         ]
-        mu.append(friction[0] * friction[1])
+        for body, known in zip((a, b), own, strict=True):
+            if body not in place and (known[0] > 0 or moves(p, body, options)):
+                raise ValueError(f"body {body}: moves, and is not among the recorded ones")
+            if known[6] > 0 or known[7] > 0:
+                raise ValueError(f"body {body}: resists rolling or spin, which is not recorded")
+        mu.append(own[0][1] * own[1][1])
         points.append(0.5 * (np.array(contact[5]) + np.array(contact[6])))
         frames.append(frame)
         pairs.append((b, a))
@@ -112,7 +126,7 @@ def record(
     velocity = np.concatenate(
         [np.concatenate(p.getBaseVelocity(body, **options)) for body in bodies] or [np.zeros(0)]
     )
-    return Recorded(
+    recorded = Recorded(
         assembled=assemble(M, v_free, h, contacts),
         engine="PyBullet",
         version=importlib.metadata.version("pybullet"),
@@ -132,6 +146,14 @@ def record(
         contacts=contacts,
         notes=(
             "w is gap / h if a contact is open, and 0 if it is closed: no penetration is"
-            " corrected. Damping of velocities is left out.",
+            " corrected. Damping of velocities and applied forces, which Bullet does not tell, are"
+            " left out.",
         ),
     )
+    return checked(recorded, EXACT[8])
+
+
+def moves(p: Any, body: int, options: dict[str, Any]) -> bool:
+    """Whether a body has joints that are not fixed."""
+    count = p.getNumJoints(body, **options)
+    return any(p.getJointInfo(body, i, **options)[2] != p.JOINT_FIXED for i in range(count))

@@ -14,6 +14,7 @@ import numpy as np
 
 from fclib import _core
 from fclib._sequence import SUFFIXES
+from fclib._words import counted
 from fclib.recorders._assemble import Assembled, Contacts
 
 Origin = Literal["exact", "reconstructed"]
@@ -194,9 +195,10 @@ class Recording:
         self.seen = self.written = 0
         self.left_out: list[tuple[int, str]] = []  # number of the step, and the reason
         self._sequence: _core.SequenceWriter | None = None
-        if self.path.is_file() or (self.path.is_dir() and any(self.path.glob("*.hdf5"))):
-            kind = "file" if self.path.is_file() else "folder"
-            raise FileExistsError(f"{self.path}: has steps already; name another {kind}")
+        if self.path.is_file():
+            raise FileExistsError(f"{self.path}: is there already; name another file")
+        if self.path.is_dir() and any(self.path.glob("*.hdf5")):
+            raise FileExistsError(f"{self.path}: has steps already; name another folder")
 
     def __enter__(self) -> Recording:
         return self
@@ -215,7 +217,7 @@ class Recording:
             return f"it took no step of {engine} of the kind that is recorded"
         if self.left_out:
             return self.without
-        return f"of {self.seen} steps, none that was kept has a contact between points"
+        return f"of {counted(self.seen, 'step')}, none that was kept has a contact between points"
 
     @property
     def without(self) -> str:
@@ -225,7 +227,10 @@ class Recording:
         number, why = self.left_out[0]
         count = len(self.left_out)
         more = f", and {count - 1} more" if count > 1 else ""
-        return f"left out of {self.seen} steps: number {number}{more}. Of number {number}: {why}"
+        return (
+            f"left out of {counted(self.seen, 'step')}: number {number}{more}. Of number {number}:"
+            f" {why}"
+        )
 
     @property
     def wanted(self) -> bool:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from fclib._files import replace_file
 from fclib.report.solids import PLANE, Array, Solids, unit
 
 FINE = 3  # pixels painted for each pixel kept, along each side
@@ -98,7 +99,7 @@ def draw(
         picture.paste(small, (0, 0))
         large, _ = paint(part, *rest)
         picture.paste(large, (strip[0], 0) if upright else (0, strip[1]))
-    picture.resize(size, Image.Resampling.LANCZOS).save(path, **saving(path))
+    save(picture.resize(size, Image.Resampling.LANCZOS), path)
 
 
 def scale_of(window: tuple[Array, Array], wide: int, tall: int) -> float:
@@ -220,12 +221,13 @@ def draw_matrix(matrix: Any, path: Path, size: tuple[int, int] = THUMB) -> None:
     picture = Image.new("RGBA", size, (255, 255, 255, 0))
     at = ((size[0] - shape[0]) // 2, (size[1] - shape[1]) // 2)
     picture.paste(image.resize((shape[0], shape[1]), Image.Resampling.BOX), at)
-    picture.save(path, **saving(path))
+    save(picture, path)
 
 
-def saving(path: Path) -> dict[str, Any]:
-    """The settings of a format: a small file, the same each time."""
-    return {"quality": 70, "method": 4} if path.suffix == ".webp" else {"optimize": True}
+def save(picture: Any, path: Path) -> None:
+    """Write an image, whole or not at all: a small file, the same each time."""
+    small = {"quality": 70, "method": 4} if path.suffix == ".webp" else {"optimize": True}
+    replace_file(path, lambda beside: picture.save(beside, path.suffix[1:], **small))
 
 
 def arrows(pen: Any, at: Array, forces: Array, longest: float, statuses: str) -> None:

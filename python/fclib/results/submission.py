@@ -14,6 +14,7 @@ import numpy as np
 
 from fclib import _core, _digest
 from fclib._judge import judge
+from fclib._words import counted
 from fclib.bench.problems import SUFFIXES
 from fclib.bench.store import Store
 from fclib.collections.ratings import solution_of
@@ -34,8 +35,8 @@ def submit(store: Store, where: Path, name: str, machine: str = "") -> Path:
     count = len(store.with_solutions())
     if count < ENOUGH:
         raise ShardError(
-            f"{store.path}: has {count} solutions, and {ENOUGH} are asked for: a campaign with"
-            " `repeated` below 1 keeps those of the problems that it repeats"
+            f"{store.path}: has {counted(count, 'solution')}, and {ENOUGH} are asked for: a"
+            " campaign with `repeated` below 1 keeps those of the problems that it repeats"
         )
     path = pack(store, where, name, machine, solutions=True)
     if path is None:

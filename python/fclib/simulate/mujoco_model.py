@@ -11,8 +11,8 @@ rolling problems. If a coefficient of torsion is not 0, they are problems of spi
 rolling.
 
 The configuration is q, then the states of actuators, which MuJoCo's own rates advance, then other
-values on which forces depend: the time if the scene has a gait (`mujoco_scene.py`), or else the
-controls.
+values on which forces depend: the time if the scene has a gait (`mujoco_scene.py`) or drives, and
+the controls if they come from outside.
 """
 
 from __future__ import annotations
@@ -58,6 +58,7 @@ from fclib.simulate.mujoco_scene import (
     keyframe_of,
     left_out,
     periodic_cell,
+    refuse_limits,
     refuse_out_of_plane,
     refuse_unknown,
 )
@@ -101,6 +102,8 @@ class MujocoModel:
 
         m = self.model
         self._drives = Drives.of(scene.name, scene.drives, m.nv)
+        if scene.interactions:
+            refuse_limits(scene, m)
         self._meetings = Meetings.of(scene, m) if scene.interactions else None
         self._cell = None if scene.period is None else periodic_cell(scene, m)
         self._margin = m.geom_margin.copy()
@@ -174,12 +177,12 @@ class MujocoModel:
 
     @property
     def position(self) -> Vector:
-        """Configuration (q, states of actuators, time or controls), a copy."""
+        """Configuration (q, states of actuators, time, controls), a copy."""
         d = self.data
         parts = [d.qpos, d.act]
-        if self._timed:
+        if self.timed:
             parts.append([d.time])
-        elif self.controlled:
+        if self.controlled:
             parts.append(d.ctrl)
         return np.concatenate(parts)
 
@@ -189,7 +192,7 @@ class MujocoModel:
         return int(self.model.nq)
 
     @property
-    def _timed(self) -> bool:
+    def timed(self) -> bool:
         """Whether forces or velocities depend on the time."""
         return self._gait is not None or self._drives is not None
 
@@ -321,9 +324,9 @@ class MujocoModel:
         m, d = self.model, self.data
         own, act, rest = np.split(position, [m.nq, m.nq + m.na])
         d.qpos[:], d.act[:] = own, act
-        if self._timed:
-            d.time = float(rest[0])
-        elif rest.size:
+        if self.timed:
+            d.time, rest = float(rest[0]), rest[1:]
+        if rest.size:
             self.control(rest)
         d.qvel[:] = velocity
         if self._cell:

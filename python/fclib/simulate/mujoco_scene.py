@@ -292,6 +292,19 @@ def refuse_unknown(scene: Scene, lost: tuple[str, ...]) -> None:
         raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
 
 
+def refuse_limits(scene: Scene, m: Any) -> None:
+    """Raise UnsupportedSceneError if a scene with interactions has limits: these have no kinds."""
+    if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT:
+        return
+    for word, limited in (("joint", m.jnt_limited), ("tendon", m.tendon_limited)):
+        for i in np.flatnonzero(limited):
+            name = getattr(m, word)(int(i)).name or i
+            raise UnsupportedSceneError(
+                f"{scene.name}: {word} {name} has limits, for which no law is known beside"
+                ' interactions of shapes; ignore "limits"'
+            )
+
+
 def keyframe_of(scene: Scene, m: Any) -> str:
     """The keyframe at which a scene starts: the named one, or one of a usual name; empty: none.
 

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from fclib._files import write_bytes
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.mujoco_model import MujocoModel
@@ -69,28 +70,23 @@ def render(
     source: Model | Step,
     path: str | Path,
     *,
-    reactions: Vector | None = None,
     size: tuple[int, int] | None = None,
 ) -> None:
-    """Write a PNG of a step, or of the present state of a model.
+    """Write a PNG of a step, or of the present state of a model, whole or not at all.
 
     source     a step is drawn in its state at the start, with the reactions of its solution;
                a model is drawn in its present state, without reactions
-    reactions  (d nc) impulses of a step to draw instead [N s]
     size       width and height in pixels; by default UPRIGHT or LYING, as the scene is
 
     NoRenderer, in one line, if no OpenGL works; OSError if the file cannot be written.
     """
     if isinstance(source, (MujocoModel, DeformableModel)):
-        if reactions is not None:
-            raise ValueError("reactions need the contacts of a step: render(step, ...)")
         model, position, contacts = source, source.position, None
         forces = np.zeros((0, 3))
     else:
         model, position, contacts = source.model, source.position, source.contacts
-        r = source.result.solution.r if reactions is None else reactions
         # an impulse over a step is a mean force
-        forces = contacts.forces(r) / model.time_step
+        forces = contacts.forces(source.result.solution.r) / model.time_step
 
     m, d = model.drawing(position)
     mujoco.mj_kinematics(m, d)
@@ -132,7 +128,7 @@ def render(
         draw_arrows(scene, contacts.point, forces, float(radii.mean()) if radii.size else 1.0)
 
     pixels = draw(m, scene, width, height)
-    Path(path).write_bytes(png(average(pixels, SUPERSAMPLING)))
+    write_bytes(Path(path), png(average(pixels, SUPERSAMPLING)))
 
 
 @functools.cache

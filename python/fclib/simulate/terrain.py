@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fclib._words import counted
 from fclib.simulate._mujoco import mujoco
 
 MOST: Final = int(mujoco.mjMAXCONPAIR)  # contacts of a pair that MuJoCo keeps
@@ -52,11 +53,14 @@ def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) 
         elif key not in done:
             contacts += of_pair[key]
             done.add(key)
-    with colliding(m, []):
-        mujoco.mj_collision(m, d)  # makes room
+    flags = m.opt.disableflags
+    m.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    mujoco.mj_collision(m, d)  # makes room; pairs that the scene names collide by no bits
+    m.opt.disableflags = flags
     if any(mujoco.mj_addContact(m, d, contact) for contact in contacts):
         raise MemoryError(
-            f'no room for {len(contacts)} contacts; raise <size memory="..."/> in the MJCF'
+            f"no room for {counted(len(contacts), 'contact')}; raise"
+            ' <size memory="..."/> in the MJCF'
         )
 
 
@@ -86,7 +90,7 @@ def contacts_of(m: Any, d: Any, field: int, other: int) -> list[Any]:
 
 @contextmanager
 def colliding(m: Any, geoms: list[int]) -> Iterator[None]:
-    """Inside the block no other geometries collide."""
+    """Inside the block no other geometries collide, but for pairs that the scene names."""
     kinds = m.geom_contype.copy(), m.geom_conaffinity.copy()
     for own, kept in zip((m.geom_contype, m.geom_conaffinity), kinds, strict=True):
         own[:] = 0
@@ -106,7 +110,7 @@ def windows(m: Any, d: Any, field: int, other: int) -> Iterator[Any]:
     middle, half = m.geom_aabb[other].reshape(2, 3)
     local = turn.T @ d.geom_xmat[other].reshape(3, 3)
     centre = turn.T @ (d.geom_xpos[other] - d.geom_xpos[field]) + local @ middle
-    reach = np.abs(local) @ half + m.geom_margin[field] + m.geom_margin[other]
+    reach = np.abs(local) @ half + margin_of(m, field, other)
     sides = m.hfield_size[number, :2]
     cells = np.array([columns, rows]) - 1
     edge = 2 * sides / cells
@@ -116,6 +120,16 @@ def windows(m: Any, d: Any, field: int, other: int) -> Iterator[Any]:
         for j in range(low[0], high[0], WINDOW):
             ends = min(i + WINDOW, high[1]), min(j + WINDOW, high[0])
             yield window(m, d, field, (i, j), ends)
+
+
+def margin_of(m: Any, one: int, other: int) -> float:
+    """The distance [m] within which two geometries have contacts: a named pair's, or their own."""
+    named = ((m.pair_geom1 == one) & (m.pair_geom2 == other)) | (
+        (m.pair_geom1 == other) & (m.pair_geom2 == one)
+    )
+    if named.any():
+        return float(m.pair_margin[named].max())
+    return float(m.geom_margin[one] + m.geom_margin[other])
 
 
 @contextmanager

@@ -27,6 +27,7 @@ from fclib.scenes.shared.deck_bodies import BodiesReader
 from fclib.scenes.shared.deck_data import (
     CONTACTORS,
     ELEMENT,
+    FRAME,
     MESH,
     OTHER_BODIES,
     OTHER_CONTACTORS,
@@ -58,7 +59,6 @@ __all__ = ["DeckError", "folder_of", "read"]
 FOLDER: Final = "DATBOX"
 NEEDED: Final = ("BODIES.DAT", "BULK_BEHAV.DAT", "TACT_BEHAV.DAT")
 MODELS, START, DRIVEN = "MODELS.DAT", "DOF.INI", "DRV_DOF.DAT"
-FRAME: Final = 1e-5  # axes of a body are written with seven digits
 
 
 def folder_of(path: str | Path) -> Path | None:
@@ -437,6 +437,12 @@ class _Reader(BodiesReader):
             )
         names = ("CT", "AMP", "OMEGA", "PHI", "RAMPI", "RAMP")
         values = [number(w, row.place, n) for w, n in zip(words, names, strict=False)]
+        if any(values[:2]) and (values[4] < -1 or values[5] < 0):
+            self.skip(
+                row.place,
+                f"below -1 the ramp {values[4]:g} + {values[5]:g} t goes on, as in LMGC90's engine;"
+                " its manual says that it stays at -1",
+            )
         return Course(
             constant=values[0],
             amplitude=values[1],
@@ -466,8 +472,8 @@ class _Reader(BodiesReader):
             if points and not time > points[-1][0]:
                 place.fail(f"the times must increase, and {time:g} follows {points[-1][0]:g}")
             points.append((time, value))
-        if not points:
-            raise DeckError(f"{path}:1: has no times and values")
+        if len(points) < 2:
+            raise DeckError(f"{path}:1: an evolution has two times and values at least")
         return Course(points=tuple(points))
 
     def check_unread(self) -> None:

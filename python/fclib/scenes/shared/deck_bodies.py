@@ -9,6 +9,7 @@ import numpy as np
 from fclib.scenes.shared.deck_data import (
     CONTACTORS,
     ELEMENT,
+    FRAME,
     MESH,
     OTHER_BODIES,
     OTHER_CONTACTORS,
@@ -17,6 +18,7 @@ from fclib.scenes.shared.deck_data import (
     Mesh,
     Patch,
     RigidBody,
+    Vector,
 )
 from fclib.scenes.shared.deck_lines import Line, Lines, Place, keyword, number, whole
 
@@ -170,7 +172,10 @@ class BodiesReader:
             half = head.numbers(3, "the half edges of a PLANx")
             if not min(half) > 0:
                 head.place.fail(f"the half edges of a PLANx must be > 0, not {half}")
-            return Contactor(kind=kind, colour=colour, size=tuple(half), place=head.place)
+            turn, shift = self.local_frame(rest, head)
+            return Contactor(
+                kind=kind, colour=colour, size=tuple(half), turn=turn, shift=shift, place=head.place
+            )
         counts = [whole(text, head.place, key) for key, text in head.values]
         if len(counts) < 2 or counts[0] < 4 or counts[1] < 4:
             head.place.fail("a POLYR has nb_vertex= and nb_faces=, each at least 4")
@@ -193,6 +198,18 @@ class BodiesReader:
             faces=np.array(faces, np.int64) - 1,
             place=head.place,
         )
+
+    def local_frame(self, rest: list[Line], head: Line) -> tuple[Vector, Vector]:
+        """The axes (3 x 3, columns) and place (3) of a PLANx in its body, if they follow it."""
+        if not rest or rest[0].words[0] != "localframe":
+            return np.eye(3), np.zeros(3)
+        place = rest.pop(0).place
+        what = "the frame of a PLANx"
+        axes = [self.row(rest, head, what).numbers(3, what) for _ in range(3)]
+        turn = np.array(axes).T
+        if not np.abs(turn.T @ turn - np.eye(3)).max() < FRAME or np.linalg.det(turn) < 0:
+            place.fail("the axes of the PLANx are not at right angles and of length 1")
+        return turn, np.array(self.row(rest, head, what).numbers(3, what))
 
     def row(self, rest: list[Line], head: Line, what: str) -> Line:
         """The next line of a contactor. DeckError if it has ended."""

@@ -26,6 +26,7 @@ OTHER_CONTACTORS: Final = (
 SEEN: Final = {"CSpx4": "CSxxx", "ASpx4": "ASpxx"}
 CONTACTORS: Final = {RIGID: ("SPHER", "PLANx", "POLYR"), MESH: ("CSpx4", "ASpx4")}
 ELEMENT: Final = "H8xxx"
+FRAME: Final = 1e-5  # axes of a body are written with seven digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,8 @@ class Contactor:
     kind: str  # SPHER, PLANx or POLYR
     colour: str
     size: tuple[float, ...] = ()  # SPHER: radius; PLANx: half edges [m]
+    turn: Vector = field(default_factory=lambda: np.eye(3))  # PLANx: its axes, as columns
+    shift: Vector = field(default_factory=lambda: np.zeros(3))  # PLANx: its place [m]
     vertices: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # POLYR (k x 3) [m]
     faces: Integers = field(default_factory=lambda: np.zeros((0, 3), np.int64))  # (f x 3) from 0
     place: Place

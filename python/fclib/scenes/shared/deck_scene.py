@@ -49,8 +49,9 @@ class Placed:
     centre: Vector  # (3) [m]
     axes: Vector  # (3 x 3) columns: its principal axes, in the world
     velocity: Vector  # (6) of the centre, and the spin about the axes
-    # its contactors, with vertices, and the place and turn of boxes, in its own frame
+    # its contactors, with vertices and the place of others, in its own frame
     shapes: tuple[tuple[Contactor, Vector, Vector], ...]
+    turn: Vector  # (3 x 3) columns: the axes of BODIES.DAT, in its own frame
 
 
 def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
@@ -64,32 +65,47 @@ def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
     volume = sum(part.volume for part in parts)
     if body.radius > 0:
         volume = polyhedron.ball(body.radius).volume
+    whole = joined(parts) if parts else polyhedron.Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+    # LMGC90 finds the centre also if the inertia is given
+    centre, axes = whole.centre, np.eye(3)
+    plate = len(body.contactors) == 1 and body.contactors[0].kind == "PLANx"
+    if plate:
+        axes = body.contactors[0].turn
     if given:
-        centre, axes = np.zeros(3), np.eye(3)
         moments = density * np.array(body.inertia)
         if not any(body.inertia):
             moments = np.full(3, density * volume * body.gyration**2)
     else:
-        whole = joined(parts)
-        centre = whole.centre
-        moments, axes = whole.principal()
+        if plate:
+            moments = polyhedron.box(np.array(body.contactors[0].size)).inertia.diagonal()
+        else:
+            moments, axes = whole.principal()
         moments = moments * (density * volume / whole.volume)
     if not (min(moments) > 0 and volume > 0):
         body.place.fail("the mass and the inertia of a body must be > 0")
     start = deck.starts.get((RIGID, index, 0))
-    turn = np.eye(3) if start is None or start.frame is None else start.frame
+    placed_axes = axes
+    if start is not None and start.frame is not None:
+        if not plate and (axes != np.eye(3)).any():
+            start.place.fail(
+                "a, b, c are the axes of inertia, which LMGC90 finds and orders itself for this"
+                " body: give its avrd, I1, I2 and I3, and its contactors along these axes"
+            )
+        placed_axes = start.frame
     moved = np.zeros(3) if start is None else start.displacement[:3]
     velocity = np.zeros(6) if start is None else start.velocity
     shapes = tuple(
-        (one, (one.vertices - centre) @ axes, -axes.T @ centre) for one in body.contactors
+        (one, (one.vertices - centre) @ axes, axes.T @ (one.shift - centre))
+        for one in body.contactors
     )
     return Placed(
         float(density * volume),
         moments,
-        body.centre + moved + turn @ centre,
-        turn @ axes,
+        body.centre + moved + centre,
+        placed_axes,
         velocity,
         shapes,
+        axes.T,
     )
 
 
@@ -108,7 +124,9 @@ def _moments(one: Contactor, unknown: list[str]) -> polyhedron.Moments:
     if one.kind == "SPHER":
         return polyhedron.ball(one.size[0])
     if one.kind == "PLANx":
-        return polyhedron.box(np.array(one.size))
+        own = polyhedron.box(np.array(one.size))
+        turned = one.turn @ own.inertia @ one.turn.T
+        return polyhedron.Moments(own.volume, one.shift, turned)
     try:
         corners, triangles = polyhedron.hull(one.vertices)
     except ValueError as error:
@@ -227,11 +245,12 @@ def _rigid(
     for i in sorted(still):
         one = all_placed[i]
         place = (one.centre, one.axes)
-        bodies += [_geom(shape, bits, assets, place, FIXED) for shape in one.shapes]
+        bodies += [_geom(shape, one.turn, bits, assets, place, FIXED) for shape in one.shapes]
     for rank, i in enumerate(moving):
         one = all_placed[i]
         geoms = "".join(
-            _geom(shape, bits, assets, None, mjcf.shade(rank, len(moving))) for shape in one.shapes
+            _geom(shape, one.turn, bits, assets, None, mjcf.shade(rank, len(moving)))
+            for shape in one.shapes
         )
         bodies.append(
             f'<body name="{RIGID} {i + 1}" pos="{mjcf.numbers(*one.centre)}"'
@@ -266,12 +285,16 @@ FIXED: Final = "0.55 0.57 0.6 1"  # the colour of what does not move
 
 def _geom(
     shape: tuple[Contactor, Vector, Vector],
+    turn: Vector,
     bits: dict[tuple[str, str], tuple[int, int, int]],
     assets: dict[str, str],
     place: tuple[Vector, Vector] | None,
     colour: str,
 ) -> str:
-    """A geometry of a body, or of the world if it has a place (centre, axes)."""
+    """A geometry of a body, or of the world if it has a place (centre, axes).
+
+    turn   (3 x 3) columns: the axes along which boxes lie, in the body's frame
+    """
     one, vertices, origin = shape
     own, seen, kind = bits.get((one.kind, one.colour), (0, 0, -1))
     look = (
@@ -291,7 +314,7 @@ def _geom(
         at, turn = centre, axes
     else:
         size = f'size="{mjcf.numbers(*one.size)}"'
-        at, turn = centre + axes @ origin, axes
+        at, turn = centre + axes @ origin, axes @ turn @ one.turn
     return (
         f'<geom type="{SHAPES[one.kind]}" {size} pos="{mjcf.numbers(*at)}"'
         f' quat="{mjcf.numbers(*quaternion(turn))}" {look}/>'

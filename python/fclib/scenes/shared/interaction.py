@@ -41,8 +41,9 @@ class Interaction:
 class Course:
     """A value that changes with time t.
 
-    (constant + amplitude cos(omega t + phase)) min(1, ramp + ramp_rate t), or linear between points
-    (t, value), and the first or last value beyond them.
+    (constant + amplitude cos(omega t + phase)) min(1, ramp + ramp_rate t), or linear between two
+    or more points (t, value), and beyond them as between the first two or the last two. So
+    LMGC90's engine has it; its manual says that a ramp stays above -1, and the engine does not.
     """
 
     constant: float = 0.0
@@ -57,8 +58,7 @@ class Course:
         """The value at a time [s]."""
         if self.points:
             i = bisect.bisect_right(self.points, time, key=lambda point: point[0])
-            if i in (0, len(self.points)):
-                return self.points[max(i - 1, 0)][1]
+            i = min(max(i, 1), len(self.points) - 1)
             (start, first), (end, last) = self.points[i - 1 : i + 1]
             return first + (last - first) * (time - start) / (end - start)
         wave = self.constant + self.amplitude * math.cos(self.omega * time + self.phase)

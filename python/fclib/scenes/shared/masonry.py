@@ -34,7 +34,7 @@ class Masonry:
     assets: list[str] = field(default_factory=list)
     bodies: list[str] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
-    fixed: list[str] = field(default_factory=list)  # supports
+    supports: dict[str, bool] = field(default_factory=dict)  # whether each is driven
     speeds: list[float] = field(default_factory=list)  # of the driven supports [m/s]
 
     def stone(
@@ -61,18 +61,19 @@ class Masonry:
         Set it after the stones: their weight decides the strength of the drive.
         """
         joint = ""
+        # fixed ones do not collide anyway
+        apart = [other for other, driven in self.supports.items() if driven or speed]
+        self.rest += [
+            f'<contact><exclude body1="{other}" body2="{name}"/></contact>'
+            for other in (["world", *apart] if speed else apart)
+        ]
+        self.supports[name] = bool(speed)
         if speed:
             joint = f'<joint name="{name}" type="slide" axis="{mjcf.numbers(*axis)}"/>'
             # at 10 m/s^2
             gain = self.mass * 10.0 / (YIELD * abs(speed))
-            self.rest += [
-                f'<contact><exclude body1="{other}" body2="{name}"/></contact>'
-                for other in ("world", *self.fixed)
-            ]
             self.rest.append(f'<actuator><velocity joint="{name}" kv="{gain!r}"/></actuator>')
             self.speeds.append(speed)
-        else:
-            self.fixed.append(name)
         self._body(name, outlines, front, back, SUPPORT, joint)
 
     def keyframe(self, velocity: Sequence[float] = ()) -> list[str]:

@@ -605,7 +605,7 @@ def test_the_campaign_that_stops_says_so_and_exits_with_1(
     monkeypatch.setattr("fclib.bench.pool.run", lambda jobs, _: ((job, lost) for job in jobs))
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 1
-    assert "stopped: 1 of 1 runs could not be done" in " ".join(done.stderr.split())
+    assert "stopped: 1 of 1 run could not be done" in " ".join(done.stderr.split())
     assert bench.Store(store).results() == []
 
 
@@ -855,7 +855,7 @@ def test_one_form_of_a_problem_is_run(
     jobs = chosen.plan(tell=words.append)
     assert {Path(job.problem.path).stem for job in jobs} == wanted
     left_out = wanted < {"0001-global", "0001-local", "0002-local", "other"} and len(wanted) > 1
-    assert [word.startswith("left out: 1 files") for word in words] == [True] * left_out
+    assert [word.startswith("left out: 1 file,") for word in words] == [True] * left_out
 
 
 # ---- what is asked for

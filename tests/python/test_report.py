@@ -625,7 +625,7 @@ def test_views_of_any_problem(kind: str, tmp_path: Path) -> None:
 def test_report_by_the_command_line(store: Path, collection: Path, tmp_path: Path) -> None:
     done = invoke("report", store, "--catalog", collection, "--out", tmp_path / "s", "--views", 1)
     assert done.exit_code == 0, done.output
-    assert "1 views" in done.output
+    assert "1 view," in done.output
     assert (tmp_path / "s" / "index.html").is_file()
     assert invoke("report").exit_code == 2
     assert invoke("report", "--pdf", "--catalog", collection).exit_code == 2

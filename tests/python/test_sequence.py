@@ -484,7 +484,7 @@ DAMAGED: list[tuple[Change, str]] = [
         resized("numbers", 0),
         r"/fclib_sequence/entries\[\d+\]: .* but /fclib_sequence/numbers has 0",
     ),
-    (resized("steps", 1), r"/fclib_sequence: has 1 steps"),
+    (resized("steps", 1), r"/fclib_sequence: has 1 step;"),
     (resized("steps", 2**60), r"/fclib_sequence/steps: has chunks that the file does not hold"),
     (resized("entries", 2**60), r"/fclib_sequence/entries: has chunks that the file does not hold"),
     (resized("numbers", 2**60), r"/fclib_sequence/numbers: has chunks that the file does not hold"),

@@ -166,12 +166,17 @@ def store(results: str, folder: Path, sources: str) -> None:
     found = [folder / f"{name}.json" for name in TARGETS]
     kept = [json.loads(path.read_text(encoding="utf-8")) for path in found if path.is_file()]
     kept = [each for each in kept if each["sources"] == sources]
-    flags = {each["flags"] or "the flags of the preset" for each in kept}
+    others = [
+        f"{each['row']['compiler']} for {each['row']['for']} with {each['flags']}"
+        for each in kept
+        if each["flags"]
+    ]
+    flags = ["the flags of the preset", *others]
     _results.store(
         results,
         [each["row"] for each in kept],
         title="The library by other compilers and for other processors",
-        note=f"Compiled with {', '.join(sorted(flags))}; no compiler warned. A test is "
+        note=f"Compiled with {', '.join(flags)}; no compiler warned. A test is "
         "skipped if it needs what the build does not have.",
     )
 

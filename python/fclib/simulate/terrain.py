@@ -55,8 +55,10 @@ def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) 
             done.add(key)
     flags = m.opt.disableflags
     m.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    mujoco.mj_collision(m, d)  # makes room; pairs that the scene names collide by no bits
-    m.opt.disableflags = flags
+    try:
+        mujoco.mj_collision(m, d)  # makes room; pairs that the scene names collide by no bits
+    finally:
+        m.opt.disableflags = flags
     if any(mujoco.mj_addContact(m, d, contact) for contact in contacts):
         raise MemoryError(
             f"no room for {counted(len(contacts), 'contact')}; raise"

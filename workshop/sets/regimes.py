@@ -210,8 +210,8 @@ REGIMES: dict[str, Regime] = {
     "Spheres": Regime(
         "Spheres",
         COLUMN | {"time_step": 1e-3},
-        keep=50,
-        steps=5000,
+        keep=20,
+        steps=8000,
         every=10,
         collection="fclib2024",
         scene="SpheresInABox",
@@ -219,8 +219,8 @@ REGIMES: dict[str, Regime] = {
     "Spheres1mm": Regime(
         "Spheres_1mm",
         MILLIMETRES,
-        keep=50,
-        steps=4000,
+        keep=8,
+        steps=5000,
         every=10,
         collection="fclib2024",
         scene="SpheresInABox",
@@ -228,8 +228,8 @@ REGIMES: dict[str, Regime] = {
     "Spheres1mmScaled": Regime(
         "Spheres_1mm_scaled",
         SCALED,
-        keep=46,
-        steps=4000,
+        keep=8,
+        steps=5000,
         every=10,
         collection="fclib2024",
         scene="SpheresInABox",
@@ -246,18 +246,18 @@ REGIMES: dict[str, Regime] = {
         "Chute (2024)",
         {"grains": 3023, "across": 12, "layers": 12, "spheres": 0.0, "gaps": True}
         | {"time_step": 2e-3},
-        keep=50,
-        steps=1000,
-        every=5,
+        keep=60,
+        steps=300,
+        every=1,
         collection="fclib2024",
     ),
     "RollingChute": Regime(
         "Chute (rolling)",
         {"grains": 1344, "across": 9, "layers": 9, "spheres": 0.0, "gaps": True}
         | {"mu_r": 0.01, "time_step": 2e-3},
-        keep=50,
-        steps=1000,
-        every=5,
+        keep=60,
+        steps=250,
+        every=1,
         collection="fclib2024",
     ),
     "RollingSoup": Regime(

@@ -447,7 +447,7 @@ NOT_MET = {
     "rr9118/Chain": ("contacts",),
     "rr9118/KaplasTower": ("density",),
     "rr9118/PeriodicBox": ("contacts",),
-    "fclib2024/Chute": ("dof",),
+    "fclib2024/Chute": ("contacts", "dof"),
     "fclib2024/RollingChute": ("dof",),
     "fclib2024/SpheresPile": ("contacts",),
 }

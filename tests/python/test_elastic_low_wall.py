@@ -49,12 +49,12 @@ def fast() -> list[Any]:
 def weight(own: Any, time: float) -> float:
     """Of the plate [N]: it grows evenly while the plate stands still."""
     length, depth = own.length * own.block + 2 * own.margin, own.depth + 2 * own.margin
-    return 148146.0 * length * depth * own.plate * 9.81 * min(1.0, time / 0.021)
+    return float(148146.0 * length * depth * own.plate * 9.81 * min(1.0, time / 0.021))
 
 
 def velocity(own: Any, time: float) -> float:
     """Of the plate along x [m/s]."""
-    return -own.speed * min(max((time - 0.021) / 0.019, 0.0), 1.0)
+    return float(-own.speed * min(max((time - 0.021) / 0.019, 0.0), 1.0))
 
 
 def at(contacts: Any, height: float) -> Any:
@@ -80,7 +80,7 @@ def masses(scene: Any) -> Any:
 
 
 def test_it_has_the_facts_of_the_deck() -> None:
-    scene = scenes.get("ElasticLowWall")().scene(0)
+    scene: Any = scenes.get("ElasticLowWall")().scene(0)
     assert (scene.time_step, scene.theta, scene.solids.gravity) == (H, THETA, 0.0)
     *blocks, plate, floor = scene.solids.meshes
     assert {(m.young, m.poisson, m.density, m.lumped) for m in blocks} == {(2.2e9, 0.2, 2e3, True)}

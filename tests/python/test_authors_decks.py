@@ -18,6 +18,7 @@ SIMULATED = (
     "ElasticCubes",
     "ElasticCubesx2",
     pytest.param("ElasticCubesx20", marks=pytest.mark.long),
+    "ElasticLowWall",
     "ShakenCell",
     pytest.param("SpheresInPlates", marks=pytest.mark.long),
 )

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from fclib.scenes.shared import mjcf
 from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.hex_box import HexBox
 from fclib.scenes.shared.interaction import Course, Drive, Interaction
-from fclib.scenes.shared.solids import HexMesh, Solids, Surface
+from fclib.scenes.shared.solids import Face, HexMesh, Solids, Surface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +62,8 @@ class ElasticCubes:
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; nothing of it is random."""
-        lower = self._cube(0.0, Surface(kind=1, candidate=False, quads=self._face(top=True)))
-        upper = self._cube(self.edge, Surface(kind=0, candidate=True, quads=self._face(top=False)))
+        lower = self._cube(0.0, kind=1, face="z+")
+        upper = self._cube(self.edge, kind=0, face="z-")
         foot = (self.elements + 1) ** 2
         return Scene.of(
             self,
@@ -85,33 +83,14 @@ class ElasticCubes:
             theta=self.theta,
         )
 
-    def _node(self, i: int, j: int, k: int) -> int:
-        return i + (self.elements + 1) * (j + (self.elements + 1) * k)
-
-    def _cube(self, z: float, surface: Surface) -> HexMesh:
-        count = self.elements
-        axis = np.linspace(0.0, self.edge, count + 1).tolist()
-        ring = ((0, 0), (1, 0), (1, 1), (0, 1))
-        return HexMesh(
-            nodes=tuple((x, y, z + height) for height in axis for y in axis for x in axis),
-            elements=tuple(
-                tuple(self._node(i + a, j + b, k + c) for c in (0, 1) for a, b in ring)
-                for k, j, i in itertools.product(range(count), repeat=3)
-            ),
+    def _cube(self, z: float, kind: int, face: Face) -> HexMesh:
+        """A cube from some height on; the nodes of kind 0 look for faces."""
+        box = HexBox(low=(0.0, 0.0, z), size=(self.edge,) * 3, elements=(self.elements,) * 3)
+        return box.mesh(
             young=self.young,
             poisson=self.poisson,
             density=self.density,
-            lumped=True,
-            surfaces=(surface,),
-        )
-
-    def _face(self, *, top: bool) -> tuple[tuple[int, ...], ...]:
-        """The quads of the upper or the lower face, outwards."""
-        ring = ((0, 0), (1, 0), (1, 1), (0, 1))[:: 1 if top else -1]
-        k = self.elements if top else 0
-        return tuple(
-            tuple(self._node(i + a, j + b, k) for a, b in ring)
-            for j, i in itertools.product(range(self.elements), repeat=2)
+            surfaces=(Surface(kind=kind, candidate=kind == 0, quads=box.quads(face)),),
         )
 
 

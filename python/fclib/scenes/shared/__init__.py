@@ -9,8 +9,9 @@ interaction.py  which shapes meet by which law, and what is driven
 polyhedron.py volume, centre and inertia of polyhedra
 recorded.py   steps of other engines as arrays in a file
 solids.py     elastic blocks and meshes, with loads and supports, for finite elements
+hex_box.py    meshes of boxes, of equal hexahedra
 assembly.py   rigid bodies and contacts from geometry alone, assembled into a problem
 
-family.py imports interaction.py and solids.py, masonry.py and deck_scene.py import mjcf.py, and
-nothing here imports a family.
+family.py imports interaction.py and solids.py, hex_box.py imports solids.py, masonry.py and
+deck_scene.py import mjcf.py, and nothing here imports a family.
 """

@@ -1,0 +1,306 @@
+"""The low wall after LMGC90's deck: its problems by NumPy, its balances, how it slides."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from fclib import scenes
+from fclib.collections import published, trajectory
+from helpers import dense
+
+pytest.importorskip("mujoco")
+
+from fclib.simulate import problem_at, scheme_of, simulate
+
+H, THETA = 1e-3, 0.5  # of the deck
+FAST = {"speed": 0.02}  # so that it slides within 15 ms of the plate's start
+
+
+def family(**changes: Any) -> Any:
+    """A wall of two courses, two blocks long."""
+    kind: Any = scenes.get("ElasticLowWall")
+    return kind(**{**kind.small, **changes})
+
+
+def states_of(own: Any, steps: int) -> list[Any]:
+    """The steps of a wall, each with its reactions (nc x 3) and its velocity before."""
+    found = []
+    before = None
+    for step in simulate(own.scene(0), steps, tol=1e-11):
+        assert step.result.converged
+        r = np.reshape(step.result.solution.r, (-1, 3))
+        before = np.zeros_like(step.velocity) if before is None else before
+        found.append((step, r, before))
+        before = step.velocity
+    return found
+
+
+@functools.cache
+def fast() -> list[Any]:
+    """60 steps of a wall that begins to slide after 25 to 40 of them."""
+    return states_of(family(**FAST), 60)
+
+
+def weight(own: Any, time: float) -> float:
+    """Of the plate [N]: it grows evenly while the plate stands still."""
+    length, depth = own.length * own.block + 2 * own.margin, own.depth + 2 * own.margin
+    return float(148146.0 * length * depth * own.plate * 9.81 * min(1.0, time / 0.021))
+
+
+def velocity(own: Any, time: float) -> float:
+    """Of the plate along x [m/s]."""
+    return float(-own.speed * min(max((time - 0.021) / 0.019, 0.0), 1.0))
+
+
+def at(contacts: Any, height: float) -> Any:
+    """Which contacts are in a bed joint at some height, or at the floor or the plate."""
+    flat = contacts.frame[:, 0, 2] ** 2 > 0.5
+    return flat & (np.abs(contacts.point[:, 2] - height) < 0.01)
+
+
+def masses(scene: Any) -> Any:
+    """An eighth of each element's mass to each of its nodes (n)."""
+    found = []
+    for mesh in scene.solids.meshes:
+        x = np.array(mesh.nodes)
+        own = np.zeros(len(x))
+        for element in mesh.elements:
+            edges = np.ptp(x[list(element)], axis=0)
+            own[list(element)] += mesh.density * edges.prod() / 8
+        found.append(np.repeat(own, 3))
+    return np.concatenate(found)
+
+
+# ---- the facts of the deck
+
+
+def test_it_has_the_facts_of_the_deck() -> None:
+    scene: Any = scenes.get("ElasticLowWall")().scene(0)
+    assert (scene.time_step, scene.theta, scene.solids.gravity) == (H, THETA, 0.0)
+    *blocks, plate, floor = scene.solids.meshes
+    assert {(m.young, m.poisson, m.density, m.lumped) for m in blocks} == {(2.2e9, 0.2, 2e3, True)}
+    assert plate.density == 148146.0
+    assert {one.law for one in scene.interactions} == {"GAP_SGR_CLB"}
+    assert {(one.mu, one.alert) for one in scene.interactions} == {(0.53, 1e-3), (0.83, 1e-2)}
+    # the published problems have 7,212 degrees of freedom, and 624 to 688 contacts
+    given = [drive for drive in scene.drives if drive.velocity]
+    nodes = sum(len(mesh.nodes) for mesh in scene.solids.meshes)
+    assert 3 * nodes - len(given) == pytest.approx(7212, rel=0.1)
+    # all of the floor is held, of the plate the motion along x is given
+    last = 3 * (nodes - len(floor.nodes))
+    assert [drive.dof for drive in given if drive.dof >= last] == list(range(last, 3 * nodes))
+    first = last - 3 * len(plate.nodes)
+    moved = [drive for drive in given if drive.dof < last]
+    assert [drive.dof for drive in moved] == list(range(first, last, 3))
+    # it stands still for 21 ms, and moves by 1 mm/s from 40 ms on
+    for drive in moved:
+        for time, speed in ((0.0, 0.0), (0.021, 0.0), (0.0305, -5e-4), (0.04, -1e-3), (9, -1e-3)):
+            assert drive.course.at(time) == pytest.approx(speed, abs=1e-12)
+
+
+def test_stored_problems_are_as_large_as_published() -> None:
+    path = published.path_of("decks/ElasticLowWall", "1")
+    if path is None:
+        pytest.skip("no states of it are stored")
+    states = trajectory.read(path)
+    assert (len(states), states.step[0], states.step[-1]) == (50, 0, 499)
+    assert set(np.diff(states.step).tolist()) <= {10, 11}
+    for place in (0, 24, 49):
+        problem = states.problem(place).problem
+        assert problem.n == pytest.approx(7212, rel=0.1)
+        assert 0.9 * 624 <= problem.nc <= 1.1 * 688
+
+
+# ---- M, H, f and w
+
+
+def foot(point: Any, corners: Any) -> tuple[Any, Any, float]:
+    """The weights (4) of a bilinear face's corners below a point or at the edge, and the gap.
+
+    Also the largest local coordinate below the point: more than 1 is beyond the edge.
+    """
+
+    def shape(a: float, b: float) -> Any:
+        return (
+            np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)])
+            / 4
+        )
+
+    def normal(a: float, b: float) -> Any:
+        along = np.array([b - 1, 1 - b, 1 + b, -1 - b]) / 4 @ corners
+        across = np.array([a - 1, -1 - a, 1 + a, 1 - a]) / 4 @ corners
+        out = np.cross(along, across)
+        return out / np.linalg.norm(out)
+
+    def off(x: Any) -> Any:
+        return shape(x[0], x[1]) @ corners + x[2] * normal(x[0], x[1]) - point
+
+    found = scipy.optimize.root(off, np.zeros(3), tol=1e-13)
+    outside = np.abs(found.x[:2]).max()
+    a, b = found.x[:2].clip(-1, 1)
+    gap = normal(a, b) @ (point - shape(a, b) @ corners)
+    return shape(a, b), gap, outside
+
+
+def test_problems_are_rebuilt_by_numpy() -> None:
+    own = family(**FAST)
+    scene = own.scene(0)
+    step, _, before = fast()[45]
+    model = step.model
+    start = step.start.position, before
+    np.testing.assert_allclose(step.start.velocity, before)
+    part = problem_at(model, scheme_of(model), *start)
+    problem, contacts = part.problem, part.contacts
+    u, time = start[0][:-1], start[0][-1]
+    x = np.concatenate([mesh.nodes for mesh in scene.solids.meshes]) + u.reshape(-1, 3)
+
+    n = len(u)
+    M, K = masses(scene), model.K.toarray()
+    plate, floor = n - 48, n - 24  # first degrees of freedom of both
+    given = np.zeros(n, dtype=bool)
+    given[plate:floor:3] = given[floor:] = True
+    later = np.zeros(n)
+    later[plate:floor:3] = velocity(own, time + H)
+    force = -K @ u
+    load = (1 - THETA) * weight(own, time) + THETA * weight(own, time + H)
+    force[plate + 2 : floor : 3] -= load / 8
+    effective = np.diag(M) + H**2 * THETA**2 * K
+    f = M * before - H**2 * THETA * (1 - THETA) * (K @ before) + H * force - effective @ later
+
+    first = np.concatenate(([0], np.cumsum([len(mesh.nodes) for mesh in scene.solids.meshes])))
+    directions = np.zeros((n, 3 * len(contacts)))
+    gaps, mu = [], []
+    for c, (master, slave) in enumerate(contacts.pair.tolist()):
+        mesh = scene.solids.meshes[master - 1]
+        best = None
+        for surface in mesh.surfaces:
+            if surface.candidate:
+                continue
+            for quad in surface.quads:
+                nodes = first[master - 1] + np.array(quad)
+                weights, gap, outside = foot(x[slave], x[nodes])
+                if abs(gap) < 0.01 and (best is None or outside < best[0] - 1e-9):
+                    best = (outside, nodes, weights, gap)
+        assert best is not None
+        outside, nodes, weights, gap = best
+        assert outside < 1 + 1e-3
+        for node, share in ((slave, 1.0), *zip(nodes, -weights, strict=True)):
+            directions[3 * node : 3 * node + 3, 3 * c : 3 * c + 3] += share * contacts.frame[c].T
+        gaps.append(gap)
+        mu.append(0.83 if scene.solids.meshes[master - 1].density > 1e5 else 0.53)
+    middle = np.array(gaps) + (1 - THETA) * H * (directions.T @ before)[0::3]
+    w = directions.T @ later
+    w[0::3] += middle / H
+
+    assert problem.n == (~given).sum()
+    np.testing.assert_array_equal(part.dofs[: problem.n], np.flatnonzero(~given))
+    free = np.ix_(~given, ~given)
+    np.testing.assert_allclose(dense(problem.M), effective[free], atol=1e-12 * effective.max())
+    np.testing.assert_allclose(dense(problem.H), directions[~given], atol=1e-9)
+    np.testing.assert_allclose(problem.f, f[~given], atol=1e-9 * np.abs(f).max())
+    np.testing.assert_allclose(problem.w, w, atol=1e-10)
+    np.testing.assert_array_equal(problem.mu, mu)
+    # it slides: something is in w beside the gaps
+    assert np.abs(w.reshape(-1, 3)[:, 1]).max() > 0.9 * own.speed
+
+
+# ---- balances
+
+
+def test_impulses_balance_the_motion_of_wall_and_plate() -> None:
+    own = family(**FAST)
+    mass = masses(own.scene(0)).reshape(-1, 3)[:, 0]
+    blocks, plate = slice(0, -16), slice(-16, -8)
+    top = own.courses * own.height
+    for step, r, before in fast():
+        c = step.contacts
+        force = step.contacts.forces(r.ravel())  # on the nodes of blocks
+        gained = mass[:, None] * (step.velocity - before).reshape(-1, 3)
+        time = step.index * H
+        load = 0.5 * H * (weight(own, time) + weight(own, time + H))
+        floor, lid = at(c, 0.0), at(c, top)
+        scale = max(load, H * 1e3)
+        # blocks: floor and plate act on them
+        outer = force[floor].sum(axis=0) + force[lid].sum(axis=0)
+        np.testing.assert_allclose(gained[blocks].sum(axis=0), outer, atol=1e-7 * scale)
+        # plate: its weight, and the wall; along x it is driven
+        held = -force[lid].sum(axis=0) - (0.0, 0.0, load)
+        np.testing.assert_allclose(gained[plate].sum(axis=0)[1:], held[1:], atol=1e-7 * scale)
+        np.testing.assert_allclose(
+            step.velocity.reshape(-1, 3)[plate, 0], velocity(own, time + H), atol=1e-15
+        )
+        assert not step.velocity.reshape(-1, 3)[-8:].any()
+
+
+def test_the_wall_carries_the_plate() -> None:
+    """In the mean over three of its periods, while it stands still."""
+    own = family(still=0.1)
+    carried = [r[at(step.contacts, 0.0), 0].sum() / H for step, r, _ in states_of(own, 100)]
+    expected = [weight(own, (k + 0.5) * H * 0.021 / 0.1) for k in range(100)]
+    assert np.mean(carried[-40:]) == pytest.approx(np.mean(expected[-40:]), rel=1e-2)
+    assert np.min(carried) >= 0
+
+
+# ---- contacts
+
+
+def test_nothing_is_pressed_into_another() -> None:
+    """But by a step's slip times the slopes of deformed faces, which the next step undoes."""
+    for step, r, _ in fast():
+        assert step.contacts.gap.min() > -1e-3 * FAST["speed"] * H
+        assert (r[:, 0] >= -1e-9 * r[:, 0].max()).all()
+
+
+@pytest.mark.parametrize(("changes", "height", "mu"), [({}, 0.2, 0.53), ({"mu": 1.2}, None, 0.83)])
+def test_it_slides_where_friction_is_least(changes: Any, height: float | None, mu: float) -> None:
+    """In the joint by 0.53; if blocks hold each other better, on floor and plate by 0.83."""
+    ratios, slips = [], []
+    for step, r, _ in states_of(family(**FAST, **changes), 60)[40:]:
+        u = np.reshape(step.result.solution.u, (-1, 3))
+        own = [at(step.contacts, z) for z in (0.0, 0.2, 0.4)]
+        pressed = r[:, 0] > 1e-3 * r[:, 0].max()
+        ratio = [np.hypot(*r[k][:, 1:].sum(axis=0)) / r[k, 0].sum() for k in own]
+        ratios.append(ratio)
+        slips.append([np.abs(u[k & pressed, 1]).mean() for k in own])
+        limit = np.asarray(step.problem.mu) * r[:, 0]
+        assert (np.hypot(r[:, 1], r[:, 2]) <= limit + 1e-6 * limit.max()).all()
+    slip = np.mean(slips, axis=0)
+    most = 1 if height is not None else int(np.argmax(slip))
+    assert int(np.argmax(slip)) == most
+    assert (most == 1) == (height is not None)
+    largest = np.max(ratios, axis=0)[most]
+    assert 0.9 * mu < largest <= mu * (1 + 1e-6)
+
+
+def test_narrow_head_joints_have_contacts_too() -> None:
+    """One for each node of a left end; wide ones have none."""
+    for joint, nodes in ((2e-4, 3 * 4), (2e-3, 0)):
+        own = family(joint=joint)
+        step, *_ = (step for step, *_ in states_of(own, 3))
+        along = np.abs(step.contacts.frame[:, 0, 0]) > 0.9
+        # one joint in the lower course, two in the upper one
+        assert along.sum() == 3 * nodes
+        np.testing.assert_allclose(step.contacts.gap[along], joint, atol=1e-9)
+        np.testing.assert_array_equal(np.asarray(step.problem.mu)[along], 0.53)
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"restitution": 0.5}, "restitution must be 0"),
+        ({"joint": 0.2}, "joint must be less than half of block"),
+        ({"layers": 0}, "layers"),
+        ({"still": 0.0}, "still"),
+    ],
+)
+def test_nonsense_is_refused(changes: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        family(**changes)

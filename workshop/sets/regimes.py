@@ -148,7 +148,7 @@ REGIMES: dict[str, Regime] = {
         "Bridge_PR",
         {"load": 0.0, "slabs": 3, "spread": 5.0, "activation": 5e-3, "all_bodies": True}
         | {"time_step": 1.5e-3},
-        keep=60,
+        keep=54,
         steps=500,
         way=EXACT,
         by=("density", "rank_ratio", "conditioning"),
@@ -189,7 +189,7 @@ REGIMES: dict[str, Regime] = {
         STEEL
         | {"young": 8e7, "poisson": 0.499, "density": 1100.0, "yaw": 1.57}
         | {"push": 7e3, "pressure": 1e4, "rise": 0.05, "bed": 1e11},
-        keep=60,
+        keep=54,
         steps=60,
         way=EXACT,
         by=("conditioning",),
@@ -246,7 +246,7 @@ REGIMES: dict[str, Regime] = {
         "Chute (2024)",
         {"grains": 3023, "across": 12, "layers": 12, "spheres": 0.0, "gaps": True}
         | {"time_step": 2e-3},
-        keep=60,
+        keep=54,
         steps=300,
         every=1,
         collection="fclib2024",
@@ -255,7 +255,7 @@ REGIMES: dict[str, Regime] = {
         "Chute (rolling)",
         {"grains": 1344, "across": 9, "layers": 9, "spheres": 0.0, "gaps": True}
         | {"mu_r": 0.01, "time_step": 2e-3},
-        keep=60,
+        keep=54,
         steps=250,
         every=1,
         collection="fclib2024",

@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument("--from-store", action="store_true", help="run nothing")
     parser.add_argument("--table", choices=[*TABLES], default="solvers")
     parser.add_argument("--by-set", action="store_true", help="ends: by set in place of family")
-    parser.add_argument("--columns", nargs="+", help="ends: only these")
+    parser.add_argument("--columns", nargs="+", help="solved, ends: only these")
     _results.add_option(parser)
     arguments = parser.parse_args()
     store = STORES / f"{arguments.name}.sqlite"
@@ -122,7 +122,7 @@ class Table:
     ending: str = ""  # of its name
 
 
-def solved(store: Path, _: argparse.Namespace) -> list[Table]:
+def solved(store: Path, asked: argparse.Namespace) -> list[Table]:
     """How many problems of each family each solver solves, and which ones not all of them do.
 
     Each solver has its own set here: the problems that it has run and takes.
@@ -150,7 +150,14 @@ def solved(store: Path, _: argparse.Namespace) -> list[Table]:
         cells["not solved"] = "; ".join(sorted(missed))
         table.append(cells)
     note = profiles.caption(whole, rows, "instances", own_set=True) + "."
-    return [Table(table, "Campaign {name}: who solves what", note, "-solved")]
+    return [Table(some(table, asked.columns), "Campaign {name}: who solves what", note, "-solved")]
+
+
+def some(table: list[Row], columns: Sequence[str] | None) -> list[Row]:
+    """Some columns of a table; all if none are asked for. SystemExit if it lacks one."""
+    if unknown := [name for name in columns or () if name not in table[0]]:
+        raise SystemExit(f"no column {unknown[0]!r}; there is: {', '.join(table[0])}")
+    return [{name: row[name] for name in columns} for row in table] if columns else table
 
 
 def short(solver: str) -> str:
@@ -325,10 +332,7 @@ def ends(store: Path, asked: argparse.Namespace) -> list[Table]:
             table.append({**ending("all", solver, every), "last stages": ""})
     if not asked.by_set:
         table = [{("family" if k == "set" else k): v for k, v in row.items()} for row in table]
-    if unknown := [name for name in asked.columns or () if name not in table[0]]:
-        raise SystemExit(f"no column {unknown[0]!r}; there is: {', '.join(table[0])}")
-    if asked.columns:
-        table = [{name: row[name] for name in asked.columns} for row in table]
+    table = some(table, asked.columns)
     note = f"{profiles.caption(profiles.gather(rows), rows, 'instances', own_set=True)}."
     return [Table(table, "Campaign {name}: what is solved, and what ends the others", note)]
 

@@ -44,6 +44,18 @@ def test_wrong_names_are_refused() -> None:
     for wrong in ([1, 2], [0.5] * 4, "abcd"):
         with pytest.raises(fclib.ProblemError, match="contacts: expected nc = 4"):
             workspace.solve(problem, wrong)
+    for names in ([[1], [2, 3], 4, 5], np.full(4, 2**63, dtype=np.uint64)):
+        with pytest.raises(fclib.ProblemError, match="contacts: "):
+            workspace.solve(problem, contacts=names)
+    with pytest.raises(fclib.ProblemError, match="problem: a NoneType is none of"):
+        workspace.solve(None)  # type: ignore[arg-type]
+    with pytest.raises(fclib.OptionError, match="tol: 'small' is not a number"):
+        fclib.Workspace(tol="small")  # type: ignore[arg-type]
+    with pytest.raises(fclib.OptionError, match="tol: inf is not a finite number"):
+        fclib.Workspace(tol=np.inf)
+    workspace.tol = "small"  # type: ignore[assignment]
+    with pytest.raises(fclib.OptionError, match="tol: 'small' is not a number"):
+        workspace.solve(problem)
     with pytest.raises(fclib.OptionError):
         fclib.Workspace(tol=-1)
 

@@ -72,14 +72,14 @@ class Law:
     mu: Any
     mu_r: Any = None
     mu_s: Any = None
-    coupled: bool = False
+    coupled: Any = False
 
     @property
     def turns(self) -> bool:
         """Whether contacts resist rolling or spin."""
         return self.mu_r is not None or self.mu_s is not None
 
-    def check(self, spacedim: int) -> None:
+    def check(self, spacedim: object) -> None:
         """ProblemError if the law has no contacts of so many components."""
         rolls, spins = self.mu_r is not None, self.mu_s is not None
         known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}

@@ -70,8 +70,11 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
 
     m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # these are for MuJoCo's own step only, and "override" changes margins, distances and friction
     enable = mujoco.mjtEnableBit
+    dropped = [f"MuJoCo's compiler: {line}" for line in lines]
+    if m.opt.enableflags & enable.mjENBL_OVERRIDE:
+        dropped.append("override (each contact keeps its own friction, margin, solref and solimp)")
+    # these are for MuJoCo's own step only, and "override" changes margins, distances and friction
     for flag in (
         enable.mjENBL_OVERRIDE,
         enable.mjENBL_SLEEP,
@@ -83,7 +86,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
         flag = IGNORABLE[feature]
         if flag is not None:
             m.opt.disableflags |= int(flag)
-    return m, tuple(dict.fromkeys(f"MuJoCo's compiler: {line}" for line in lines))
+    return m, tuple(dict.fromkeys(dropped))
 
 
 def compiled(scene: Scene) -> Any:
@@ -241,6 +244,10 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
         lost.append("anisotropic friction (the mean of two coefficients)")
     if softened(m, touching):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
+    if softened_friction(m):
+        lost.append("solref and solimp of dry friction (a joint or a contact sticks without creep)")
+    if m.nplastic:
+        lost.append("springs that yield (they stay elastic)")
     # a family explains its own parameter
     if widened(m, touching) and "margin" not in scene.parameters:
         lost.append("margins (bodies touch where their surfaces do, limits act where they are)")
@@ -261,6 +268,10 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     return tuple(lost)
 
 
+# solref and solimp, MuJoCo's defaults
+USUAL: Final = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
+
+
 def softened(m: Any, touching: Any) -> bool:
     """Whether a model sets other compliances than MuJoCo's defaults."""
     limited, tied = m.jnt_limited.astype(bool), m.eq_active0.astype(bool)
@@ -271,8 +282,20 @@ def softened(m: Any, touching: Any) -> bool:
         np.hstack((m.tendon_solref_lim, m.tendon_solimp_lim))[m.tendon_limited.astype(bool)],
         np.hstack((m.eq_solref, m.eq_solimp))[tied],
     )
-    usual = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
-    return any(bool((own != usual).any()) for own in rows)
+    return any(bool((own != USUAL).any()) for own in rows)
+
+
+def softened_friction(m: Any) -> bool:
+    """Whether a model sets other compliances of dry friction than those of its other rows."""
+    if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS:
+        rows: tuple[Any, ...] = ()
+    else:
+        rows = (
+            np.hstack((m.dof_solref, m.dof_solimp))[m.dof_frictionloss > 0],
+            np.hstack((m.tendon_solref_fri, m.tendon_solimp_fri))[m.tendon_frictionloss > 0],
+        )
+    # zeros: as the normal component
+    return any(bool((own != USUAL).any()) for own in rows) or bool(m.pair_solreffriction.any())
 
 
 def widened(m: Any, touching: Any) -> bool:

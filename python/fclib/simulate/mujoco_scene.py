@@ -170,22 +170,37 @@ def bottom(m: Any, d: Any, geom: int) -> float:
 
 def refuse_no_numbers(scene: Scene, m: Any) -> None:
     """Raise ValueError if data of a model are not finite: MuJoCo accepts them."""
-    for kind, count in (("geom", m.ngeom), ("body", m.nbody), ("jnt", m.njnt), ("dof", m.nv)):
-        for name in NUMBERS[kind]:
-            values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
-            values = values.reshape(count, values.size // max(count, 1))
-            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-            if bad.size:
-                refuse(scene, m, kind, int(bad[0]), name, values[bad[0]])
-    for i in np.flatnonzero(~np.isfinite(m.pair_friction).all(axis=1)):
-        raise ValueError(f"{scene.name}: pair {i}: its friction is not finite")
+    for names in (NUMBERS, numbers_of(m)):  # what others follow from comes first
+        for kind, own in names.items():
+            for name in own:
+                values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
+                if np.isfinite(values).all():
+                    continue
+                values = values.reshape(len(values), -1)
+                bad = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+                refuse(scene, m, kind, bad, name, values[bad])
+    for name in ("wind", "density", "viscosity"):
+        if not np.isfinite(getattr(m.opt, name)).all():
+            raise ValueError(f"{scene.name}: option: its {name} is not finite")
+
+
+def numbers_of(m: Any) -> dict[str, list[str]]:
+    """All arrays of numbers that a model has of its elements, by the kind of element."""
+    return {
+        kind: [
+            name.removeprefix(f"{kind}_")
+            for name in dir(m)
+            if name.startswith(f"{kind}_") and getattr(m, name).dtype.kind == "f"
+        ]
+        for kind in (*NUMBERS, "tendon", "actuator", "eq", "pair", "key")
+    }
 
 
 def refuse(scene: Scene, m: Any, kind: str, i: int, name: str, values: Vector) -> None:
     """Raise ValueError if a value is not finite."""
-    word = {"geom": "geom", "body": "body"}.get(kind, "joint")
+    word = {"jnt": "joint", "dof": "joint", "eq": "equality", "key": "keyframe"}.get(kind, kind)
     number = int(m.dof_jntid[i]) if kind == "dof" else i
-    own = getattr(m, word)(number).name
+    own = getattr(m, {"dof": "jnt"}.get(kind, kind))(number).name
     raise ValueError(
         f"{scene.name}: {word} {own or number}: its {name} is not finite"
         f" ({' '.join(f'{value:g}' for value in values)})"

@@ -3,12 +3,16 @@
 #include <nanobind/stl/string.h>
 
 #include <limits>
+#include <memory>
 #include <string>
 
 #include "error.hpp"
 #include "linalg/places.hpp"
+#include "module.hpp"
 
 namespace fclib::bindings {
+
+using namespace nanobind::literals;
 
 namespace {
 
@@ -75,6 +79,17 @@ std::vector<double> values_from(nb::handle object, const char* what) {
   return {array.data(), array.data() + array.shape(0)};
 }
 
+/// As csr; SciPy itself follows the indices of blocks before they are here to be looked at.
+nb::object as_rows(const nb::object& matrix, const std::string& format, const char* what) {
+  try {
+    if (format == "bsr") matrix.attr("check_format")(nb::arg("full_check") = true);
+    return matrix.attr("tocsr")();
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError)) throw;
+    unfit(what, nb::cast<std::string>(nb::str(error.value())));
+  }
+}
+
 Index size_from(nb::handle object, const char* what) {
   const auto size = nb::cast<std::int64_t>(object);
   if (size > std::numeric_limits<Index>::max()) unfit(what, "a size does not fit 32 bits");
@@ -134,7 +149,7 @@ Matrix matrix_from(nb::handle object, const char* what) {
   nb::object source = nb::borrow(object);
   auto format = nb::cast<std::string>(source.attr("format"));
   if (format != "csr" && format != "csc" && format != "coo") {
-    source = source.attr("tocsr")();
+    source = as_rows(source, format, what);
     format = "csr";
   }
   if (nb::cast<int>(source.attr("ndim")) != 2) unfit(what, "is not a matrix");
@@ -159,6 +174,22 @@ Matrix matrix_from(nb::handle object, const char* what) {
   }
   validate_places(a, what);  // SciPy itself does not check these indices
   return a;
+}
+
+void bind_arrays(nb::module_& m) {
+  m.def(
+      "matrix_from",
+      [](const nb::object& given, const std::string& what) {
+        auto own = std::make_unique<Matrix>(matrix_from(given, what.c_str()));
+        const Matrix& matrix = *own;
+        const nb::capsule owner(own.release(),
+                                [](void* a) noexcept { delete static_cast<Matrix*>(a); });
+        return to_python(matrix, owner);
+      },
+      "given"_a, "what"_a, nb::sig("def matrix_from(given: Any, what: str) -> Any"),
+      "A copy of a matrix of SciPy or NumPy, whose indices are in its shape. SciPy itself does not "
+      "look, and reads beyond its arrays.\n\n"
+      "Raises ProblemError, by the name of what it is, for anything else.");
 }
 
 }  // namespace fclib::bindings

@@ -41,6 +41,7 @@ NB_MODULE(_core, m) {
       "hdf5_bundled is empty if HDF5 is a library of the system, metis if the core has "
       "none.");
   bind_errors(m);
+  bind_arrays(m);
   bind_problems(m);
   bind_conversions(m);
   bind_arrangements(m);

@@ -35,6 +35,8 @@ bool poll_signals();
 
 /// Error and what derives from it.
 void bind_errors(nb::module_& m);
+/// Matrices that are no part of a problem.
+void bind_arrays(nb::module_& m);
 /// The problems of all formulations, Solution, ProblemInfo and MatrixInfo.
 void bind_problems(nb::module_& m);
 /// Methods of problems: condense or eliminate, with_storage.

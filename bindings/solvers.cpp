@@ -103,6 +103,10 @@ void bind_solve(nb::module_& m) {
         if (options.size() > 0) values = nb::cast<OptionValues>(options);
         const Solution start = guess.is_none() ? Solution{} : solution_from(guess, "guess");
         return visit_problem(problem, [&](const auto& given) {
+          if (!guess.is_none()) {  // to the driver no entries are no guess
+            detail::require_size(static_cast<Index>(start.r.size()), given.size(Dim::m), Dim::m,
+                                 "guess r", "entries");
+          }
           const Unlocked unlocked;
           return solve(given, solver, settings, values, start);
         });

@@ -337,11 +337,8 @@ Result out_of_time(const GlobalProblem& problem, const Condensation& condensatio
 template <class P>
 void require_solvable(const P& problem, const Solver& solver, const Solution& guess) {
   validate(problem);
-  if (guess.r.size() > 0 && (guess.r.size() != problem.size(Dim::m) || !guess.r.allFinite())) {
-    throw Error(ErrorKind::problem,
-                "has " + std::to_string(guess.r.size()) + " entries, expected m = " +
-                    std::to_string(problem.size(Dim::m)) + " finite ones",
-                "guess r");
+  if (guess.r.size() > 0) {
+    detail::validate_vector(guess.r, problem.size(Dim::m), Dim::m, Range::any, "guess r");
   }
   const auto& taken = P::rolling ? solver.rolling_dimensions
                       : P::spin  ? solver.spin_dimensions

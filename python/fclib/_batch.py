@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from fclib import _core, _device
 from fclib._equality import EqualByEntries
+from fclib._solve import check_limits, name_wrong_type
 from fclib._words import counted
 
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -70,24 +72,27 @@ class Law:
     mu: Any
     mu_r: Any = None
     mu_s: Any = None
-    coupled: bool = False
+    coupled: Any = False
 
     @property
     def turns(self) -> bool:
         """Whether contacts resist rolling or spin."""
         return self.mu_r is not None or self.mu_s is not None
 
-    def check(self, spacedim: int) -> None:
+    def check(self, spacedim: object) -> None:
         """ProblemError if the law has no contacts of so many components."""
         rolls, spins = self.mu_r is not None, self.mu_s is not None
         known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}
-        if spacedim not in (fits := known.get((rolls, spins), (6,))):
+        fits = known.get((rolls, spins), (6,))
+        if not isinstance(spacedim, Integral) or spacedim not in fits:
             given = [name for name in ("mu_r", "mu_s") if getattr(self, name) is not None]
             words = f"expected {' or '.join(map(str, fits))}"
             raise _core.ProblemError(
-                f"spacedim: is {spacedim}, {words}"
+                f"spacedim: is {spacedim!r}, {words}"
                 + (f" as there is {' and '.join(given)}" if given else "")
             )
+        if not isinstance(self.coupled, bool):
+            raise _core.ProblemError(f"coupled: is {self.coupled!r}, expected True or False")
         if self.coupled and (rolls or not spins):
             raise _core.ProblemError("coupled: is for spacedim 4, which has mu_s")
 
@@ -177,7 +182,7 @@ def solve_batch(
     """
     law = Law(mu, mu_r, mu_s, coupled)
     law.check(spacedim)
-    check_options(tol, threads, time_limit)
+    check_limits(tol, time_limit, threads=threads)
     if unsolved not in ("cpu", "leave"):
         raise _core.OptionError(f'unsolved: is {unsolved!r}, expected "cpu" or "leave"')
     if jacobian is None and (inverse_mass is not None or velocity is not None):
@@ -271,16 +276,6 @@ def solve_batch(
     return result
 
 
-def check_options(tol: float, threads: int, time_limit: float | None) -> None:
-    """OptionError if one is out of range."""
-    if not tol >= 0:
-        raise _core.OptionError(f"tol: {tol} is not a positive number")
-    if threads < 0:
-        raise _core.OptionError(f"threads: {threads} is negative")
-    if time_limit is not None and not time_limit > 0:
-        raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
-
-
 def check_contacts(contacts: npt.ArrayLike) -> npt.NDArray[np.int32]:
     """The numbers of contacts, of each problem one."""
     given = np.asarray(contacts)
@@ -313,26 +308,30 @@ def run(
     iterations = np.empty(count, dtype=np.int32)
     names = ("W", "q", "starts", "columns", "n", "M", "H", "f", "w")
     arrays: dict[str, Any] = {name: given.get(name) for name in names}
-    by_auto, first, wrong = _core.solve_batch(
-        spacedim=spacedim,
-        count=count,
-        each=each,
-        nc=counts,
-        one_pattern=given.get("one_pattern", False),
-        n_each=given.get("n_each", 0),
-        **arrays,
-        **friction,
-        guess=None if guess is None else guess.reshape(-1),
-        r=r.reshape(-1),
-        u=u.reshape(-1),
-        v=None if v is None else v.reshape(-1),
-        status=status,
-        error=error,
-        iterations=iterations,
-        tolerance=tol,
-        threads=threads,
-        time_limit=math.inf if time_limit is None else time_limit,
-    )
+    try:
+        by_auto, first, wrong = _core.solve_batch(
+            spacedim=spacedim,
+            count=count,
+            each=each,
+            nc=counts,
+            one_pattern=given.get("one_pattern", False),
+            n_each=given.get("n_each", 0),
+            **arrays,
+            **friction,
+            guess=None if guess is None else guess.reshape(-1),
+            r=r.reshape(-1),
+            u=u.reshape(-1),
+            v=None if v is None else v.reshape(-1),
+            status=status,
+            error=error,
+            iterations=iterations,
+            tolerance=tol,
+            threads=threads,
+            time_limit=math.inf if time_limit is None else time_limit,
+        )
+    except TypeError:
+        name_wrong_type(tol=tol, threads=threads, time_limit=time_limit)
+        raise
     if wrong:
         wrong = f"problem {first}: {wrong}"
     return BatchResult(r, u, status, error, iterations, offsets, by_auto, v, wrong)
@@ -381,7 +380,8 @@ def _blocks_of_each(
             raise _core.ProblemError(
                 f"W: problem {k} has the shape {np.shape(one)}, expected {(m, m)}"
             )
-        blocks = sp.csr_array(one).tobsr(blocksize=(spacedim, spacedim))
+        own = sp.csr_array(_core.matrix_from(one, f"problem {k}: W"))
+        blocks = own.tobsr(blocksize=(spacedim, spacedim))
         blocks.sort_indices()
         starts.append(blocks.indptr)
         columns.append(blocks.indices)

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._batch import Floats, broadcast, floats, shaped
+from fclib._batch import Floats, Law, broadcast, floats, shaped
 from fclib._equality import EqualByEntries
+from fclib._solve import check_limits, name_wrong_type
 
 Flags = npt.NDArray[np.bool_]
 
@@ -63,10 +64,9 @@ class _Solved:
         spacedim: int,
         threads: int,
     ) -> None:
-        if spacedim not in (2, 3):
-            raise _core.ProblemError(f"spacedim: is {spacedim}, expected 2 or 3")
-        if threads < 0:
-            raise _core.OptionError(f"threads: {threads} is negative")
+        Law(mu).check(spacedim)
+        check_limits(0, None, threads=threads)
+        name_wrong_type(threads=threads)
         matrices = floats("W", W)
         if matrices.ndim != 3 or matrices.shape[1] != matrices.shape[2]:
             raise _core.ProblemError(f"W: has the shape {matrices.shape}, expected (count, m, m)")

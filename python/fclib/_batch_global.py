@@ -11,12 +11,12 @@ from fclib._batch import (
     BatchResult,
     Law,
     check_contacts,
-    check_options,
     flat,
     floats,
     run,
     shaped,
 )
+from fclib._solve import check_limits
 
 
 def solve_batch_global(
@@ -66,7 +66,7 @@ def solve_batch_global(
     """
     law = Law(mu, mu_r, mu_s, coupled)
     law.check(spacedim)
-    check_options(tol, threads, time_limit)
+    check_limits(tol, time_limit, threads=threads)
     given: dict[str, Any]
     if isinstance(M, (list, tuple)):
         for name, values in (("H", H), ("f", f)):

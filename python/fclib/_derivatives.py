@@ -181,7 +181,7 @@ def _of_shape(name: str, value: Any, like: Any) -> Array | None:
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     """The caller's values, as finite numbers in this shape."""
-    value = value.toarray() if hasattr(value, "toarray") else value
+    value = _core.matrix_from(value, name).toarray() if hasattr(value, "tocsr") else value
     try:
         array = np.asarray(value)
     except ValueError:

@@ -78,16 +78,7 @@ def solve(
             bilateral constraints contradict each other by more than ``tol``.
         SolverError: a solver outside of fclib failed.
     """
-    try:
-        if not 0 <= tol < math.inf:
-            raise _core.OptionError(f"tol: {tol} is not a finite number of 0 or more")
-        if max_iterations is not None and max_iterations < 1:
-            raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
-        if time_limit is not None and not time_limit > 0:
-            raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
-    except TypeError:
-        _check_types(problem, tol, max_iterations, time_limit, callback, history)
-        raise
+    check_limits(tol, time_limit, max_iterations=max_iterations)
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
     if isinstance(solver, str) and " " in solver:
@@ -108,35 +99,65 @@ def solve(
             merit == "natural",
         )
     except TypeError:
-        _check_types(problem, tol, max_iterations, time_limit, callback, history)
+        limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
+        name_wrong_type(problem=problem, **limits, history=history, callback=callback)
         raise  # the callback raised it
 
 
-def _check_types(
-    problem: object,
-    tol: object,
-    max_iterations: object,
-    time_limit: object,
-    callback: object,
-    history: object,
+def check_limits(
+    tol: float,
+    time_limit: float | None,
+    *,
+    max_iterations: int | None = None,
+    threads: int = 0,
 ) -> None:
-    """Say which argument of ``solve`` is of a wrong type, if any, once something was."""
-    if not isinstance(problem, get_args(Problem)):
-        known = ", ".join(kind.__name__ for kind in get_args(Problem))
-        raise _core.ProblemError(f"problem: a {type(problem).__name__} is none of {known}")
-    for name, value, right, meant in (
-        ("tol", tol, isinstance(tol, Real), "a number"),
-        ("max_iterations", max_iterations, _is_count(max_iterations), "a 64-bit integer"),
-        ("time_limit", time_limit, isinstance(time_limit, (Real, NoneType)), "a number of seconds"),
-        ("history", history, isinstance(history, bool), "True or False"),
-        ("callback", callback, callback is None or callable(callback), "a function"),
-    ):
-        if not right:
+    """OptionError if one is out of range, or no number."""
+    try:
+        if not 0 <= tol < math.inf:
+            raise _core.OptionError(f"tol: {tol} is not a finite number of 0 or more")
+        if max_iterations is not None and max_iterations < 1:
+            raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
+        if time_limit is not None and not time_limit > 0:
+            raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+        if threads < 0:
+            raise _core.OptionError(f"threads: {threads} is negative")
+    except (TypeError, ValueError):
+        limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
+        name_wrong_type(**limits, threads=threads)
+        raise
+
+
+def name_wrong_type(**given: object) -> None:
+    """Say which argument is of a wrong type, if any, once something was: the core names none."""
+    for name, value in given.items():
+        if name == "problem":
+            check_problem(value)
+            continue
+        fits, meant = _TYPES[name]
+        if not fits(value):
             raise _core.OptionError(f"{name}: {value!r} is not {meant}")
 
 
-def _is_count(value: object) -> bool:
-    return value is None or (isinstance(value, Integral) and int(value) < 2**63)
+def check_problem(problem: object) -> None:
+    """ProblemError if it is none."""
+    if not isinstance(problem, get_args(Problem)):
+        known = ", ".join(kind.__name__ for kind in get_args(Problem))
+        raise _core.ProblemError(f"problem: a {type(problem).__name__} is none of {known}")
+
+
+def _is_count(value: object, bits: int) -> bool:
+    return isinstance(value, Integral) and abs(int(value)) < 2 ** (bits - 1)
+
+
+# of each argument of solve and its like, whether a value may be one, and what is meant
+_TYPES: dict[str, tuple[Callable[[object], bool], str]] = {
+    "tol": (lambda value: isinstance(value, Real), "a number"),
+    "max_iterations": (lambda value: value is None or _is_count(value, 64), "a 64-bit integer"),
+    "time_limit": (lambda value: isinstance(value, (Real, NoneType)), "a number of seconds"),
+    "threads": (lambda value: _is_count(value, 32), "a 32-bit integer"),
+    "history": (lambda value: isinstance(value, bool), "True or False"),
+    "callback": (lambda value: value is None or callable(value), "a function"),
+}
 
 
 def _plain(name: str, value: object) -> bool | int | float | str:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._solve import Problem, solve
+from fclib._solve import Problem, check_limits, check_problem, name_wrong_type, solve
 
 
 class Workspace:
@@ -28,10 +28,7 @@ class Workspace:
     """
 
     def __init__(self, tol: float = 1e-8, *, time_limit: float | None = None) -> None:
-        if not tol >= 0:
-            raise _core.OptionError(f"tol: {tol} is not a positive number")
-        if time_limit is not None and not time_limit > 0:
-            raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+        check_limits(tol, time_limit)
         self.tol = tol
         self.time_limit = time_limit
         self._core = _core.Workspace()
@@ -50,10 +47,15 @@ class Workspace:
         Raises:
             ProblemError: the data of the problem is not valid, or there are not nc names.
         """
+        check_problem(problem)
         names = None if contacts is None else _names(contacts, problem.nc)
         limit = math.inf if self.time_limit is None else self.time_limit
         if type(problem) is _core.LocalProblem and problem.p == 0:
-            return self._core.solve(problem, names, self.tol, limit)
+            try:
+                return self._core.solve(problem, names, self.tol, limit)
+            except TypeError:
+                name_wrong_type(tol=self.tol, time_limit=self.time_limit)
+                raise
         r = np.zeros(problem.m)
         self._core.guess(problem.spacedim, names, r)
         guess = _core.Solution(r=r) if r.any() else None
@@ -70,9 +72,14 @@ class Workspace:
 
 
 def _names(contacts: npt.ArrayLike, nc: int) -> Any:
-    names = np.asarray(contacts)
+    try:
+        names = np.asarray(contacts)
+    except ValueError:
+        raise _core.ProblemError(f"contacts: is not a list of nc = {nc} whole numbers") from None
     if names.shape != (nc,) or (names.dtype.kind not in "iu" and nc > 0):
         raise _core.ProblemError(
             f"contacts: expected nc = {nc} whole numbers, not {names.dtype} {names.shape}"
         )
+    if names.dtype.kind == "u" and (names > np.iinfo(np.int64).max).any():
+        raise _core.ProblemError("contacts: a name does not fit 64 bits with a sign")
     return np.ascontiguousarray(names, dtype=np.int64)

@@ -94,6 +94,32 @@ def test_wrong_input_is_refused_by_its_name() -> None:
         fclib.solve_batch(W.ravel(), list(q[:3]), mu, contacts=[2] * 4)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"tol": "small"}, "tol: 'small' is not a number"),
+        ({"tol": None}, "tol: None is not a number"),
+        ({"tol": np.ones(2)}, "tol: array.* is not a number"),
+        ({"threads": "all"}, "threads: 'all' is not a 32-bit integer"),
+        ({"threads": 1.5}, "threads: 1.5 is not a 32-bit integer"),
+        ({"threads": 2**40}, "threads: [0-9]+ is not a 32-bit integer"),
+        ({"time_limit": "1 s"}, "time_limit: '1 s' is not a number of seconds"),
+        ({"spacedim": 3.0}, "spacedim: is 3.0, expected 2 or 3"),
+        ({"spacedim": "3"}, "spacedim: is '3', expected 2 or 3"),
+        ({"coupled": "no"}, "coupled: is 'no', expected True or False"),
+    ],
+)
+def test_an_argument_of_a_wrong_type_is_named(wrong: dict[str, Any], words: str) -> None:
+    W, q, mu = problems(2, 2)
+    with pytest.raises(fclib.Error, match=f"^{words}"):
+        fclib.solve_batch(W, q, mu, **wrong)
+    with pytest.raises(fclib.Error, match=f"^{words}"):
+        fclib.solve_batch_global(W, W, q, mu, **wrong)
+    if wrong.keys() & {"threads", "spacedim"}:
+        with pytest.raises(fclib.Error, match=f"^{words}"):
+            fclib.vjp_batch(W, q, mu, np.zeros_like(q), **wrong)
+
+
 @pytest.mark.parametrize("threads", [1, 3])
 def test_a_bad_problem_has_its_status_and_hurts_no_other(threads: int) -> None:
     W, q, mu = problems(2, 200)

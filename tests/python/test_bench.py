@@ -14,6 +14,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -435,6 +436,33 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         bench.Store(tmp_path / "absent" / "new.sqlite")
     assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
     assert not (tmp_path / "absent.sqlite").exists()
+
+
+def test_what_is_no_store_is_not_made_one(tmp_path: Path) -> None:
+    """SQLite takes a file of one byte for a new database."""
+    letter = tmp_path / "letter.json"
+    letter.write_text("{")
+    for create in (False, True):
+        with pytest.raises(bench.StoreError, match=r"letter\.json: is no database, and no store"):
+            bench.Store(letter, create=create)
+    assert letter.read_text() == "{"
+    bare = tmp_path / "bare.sqlite"
+    with closing(sqlite3.connect(bare)) as database:
+        database.execute("PRAGMA user_version = 7")
+    before = bare.read_bytes()
+    with pytest.raises(bench.StoreError, match="without tables, and no store"):
+        bench.Store(bare, create=False)
+    assert bare.read_bytes() == before
+
+
+def test_what_cannot_be_merged_leaves_no_store(tmp_path: Path) -> None:
+    new, wrong = tmp_path / "new.sqlite", tmp_path / "wrong.parquet"
+    wrong.write_text("no table")
+    assert run_cli("merge", new, tmp_path / "none.sqlite").returncode == 1
+    assert run_cli("merge", new, wrong).returncode == 1
+    with pytest.raises(RuntimeError), bench.Store(new):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == [wrong]
 
 
 def made_older(path: Path) -> None:

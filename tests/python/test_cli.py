@@ -608,6 +608,12 @@ def test_a_link_to_itself_is_one_line(
     assert list(folder.iterdir()) == [loop]
 
 
+def test_what_cannot_be_converted_leaves_no_folder(tmp_path: Path) -> None:
+    done = run("convert", tmp_path / "none.h5", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_output_folder_that_is_a_file_is_named(files: list[Path]) -> None:
     done = run("convert", files[0], "--out", files[1])
     assert done.returncode == 1

@@ -772,6 +772,22 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
             ),
             "delays",
         ),
+        (
+            mjcf(SPHERE, rest='<option o_friction="1 1 1 1 1"><flag override="enable"/></option>'),
+            "override",
+        ),
+        (mjcf(ARM.replace('name="elbow"', 'name="elbow" stiffness="9" springyield="1"')), "yield"),
+        (
+            mjcf(ARM.replace('name="elbow"', 'name="elbow" frictionloss="1" solreffriction="2 1"')),
+            "dry friction",
+        ),
+        (
+            mjcf(
+                SPHERE.replace("<geom ", '<geom name="ball" '),
+                rest='<contact><pair geom1="floor" geom2="ball" solreffriction="2 1"/></contact>',
+            ),
+            "dry friction",
+        ),
     ],
 )
 def test_what_is_left_out_is_said_and_strictly_refused(xml: str, message: str) -> None:

@@ -578,6 +578,28 @@ def test_data_that_are_not_finite_are_refused(attribute: str, word: str) -> None
         run(document(ball), 1)
 
 
+@pytest.mark.parametrize(
+    ("joint", "rest", "word"),
+    [
+        ('damping="1 nan 1"', "", "joint j: its dampingpoly"),
+        ("", '<option viscosity="nan"/>', "option: its viscosity"),
+        ("", '<option wind="nan 0 0"/>', "option: its wind"),
+        ("", '<keyframe><key ctrl="nan"/></keyframe>', "keyframe 0: its ctrl"),
+        ("", '<tendon><fixed frictionloss="nan">{}</fixed></tendon>', "tendon 0: its frictionloss"),
+        ("", '<tendon><fixed limited="true" range="-1 nan">{}</fixed></tendon>', "tendon 0: its r"),
+        ("", '<equality><joint joint1="j" polycoef="nan"/></equality>', "equality 0: its data"),
+    ],
+)
+def test_no_number_that_is_not_finite_is_taken(joint: str, rest: str, word: str) -> None:
+    """MuJoCo leaves some out, and the simulation went on without them."""
+    arm = f'<body><joint name="j" {joint}/><geom size="0.1" mass="1" contype="0"/></body>'
+    motor = '<actuator><motor joint="j"/></actuator>'
+    more = rest.replace("{}", '<joint joint="j" coef="1"/>')
+    xml = document(arm).replace("</mujoco>", f"{motor}{more}</mujoco>")
+    with pytest.raises(ValueError, match=f"test: {word}.* not finite"):
+        run(xml, 1)
+
+
 def test_a_number_that_the_compiler_replaces_is_said() -> None:
     ball = '<body pos="0 0 0.1"><freejoint/><geom size="0.1" mass="nan"/></body>'
     (step,) = run(document(ball), 1)

@@ -316,6 +316,7 @@ def test_any_false_answer_of_the_callback_stops_the_solver(answer: Any) -> None:
     [
         ({"solver": None}, "solver: None is not a name"),
         ({"tol": "small"}, "tol: 'small' is not a number"),
+        ({"tol": np.ones(2)}, "tol: array.* is not a number"),
         ({"max_iterations": 1.5}, "max_iterations: 1.5 is not a 64-bit integer"),
         ({"max_iterations": 10**30}, "max_iterations: 10+ is not a 64-bit integer"),
         ({"time_limit": "1 s"}, "time_limit: '1 s' is not a number of seconds"),
@@ -412,9 +413,17 @@ def test_a_guess_that_moves_nothing_is_left_for_zero() -> None:
 
 def test_a_guess_that_does_not_fit_is_an_error() -> None:
     problem = hard()
-    for r in (np.zeros(problem.m - 1), np.zeros(3), np.full(problem.m, np.nan)):
-        with pytest.raises(fclib.ProblemError, match="guess"):
+    half = np.zeros(problem.m)
+    half[4] = np.inf
+    for r, words in (
+        (np.zeros(problem.m - 1), f"guess r: has {problem.m - 1} entries, expected m"),
+        (np.zeros(3), "guess r: has 3 entries, expected m"),
+        (half, r"guess r\[4\]: the value is not a finite number"),
+    ):
+        with pytest.raises(fclib.ProblemError, match=words):
             fclib.solve(problem, guess=fclib.Solution(r=r))
+    with pytest.raises(fclib.ProblemError, match="guess r: has 0 entries, expected m"):
+        fclib.solve(problem, guess=[])
 
 
 def test_the_same_call_gives_the_same_bits() -> None:

@@ -14,6 +14,7 @@ import pytest
 import scipy.sparse as sp
 
 import fclib
+from fclib.recorders._assemble import dense
 from helpers import planted_global, planted_local
 
 
@@ -212,6 +213,29 @@ def test_a_matrix_that_contradicts_itself_is_refused_where_it_is_made(what: str)
     matrix, where = wrong_places()[what]
     with pytest.raises(fclib.ProblemError, match=f"^{re.escape(where)}: "):
         fclib.LocalProblem(W=matrix, q=np.ones(6), mu=[0.5, 0.5])
+
+
+@pytest.mark.parametrize("what", [*wrong_places(), "blocks", "keys"])
+def test_a_matrix_that_contradicts_itself_ends_no_process(what: str) -> None:
+    """SciPy would read beyond its arrays as soon as it turns one into another form."""
+    if what == "blocks":
+        matrix: Any = sp.bsr_array(np.ones((6, 6)), blocksize=(3, 3))
+        matrix.indices[0] = 10**7
+    elif what == "keys":
+        matrix = sp.dok_array(np.ones((6, 6)))
+        matrix._dict[10**7, 1] = 1.0
+    else:
+        matrix, _ = wrong_places()[what]
+    q, mu = np.array([-1.0, 0, 0, 1, 0, 0]), [0.5, 0.5]
+    problem = fclib.LocalProblem(W=np.eye(6), q=q, mu=mu)
+    with pytest.raises(fclib.ProblemError, match=r"^problem 1: W"):
+        fclib.solve_batch([np.eye(6), matrix], [q, q], 0.5)
+    with pytest.raises(fclib.ProblemError, match=r"^W"):
+        fclib.jvp(problem, fclib.solve(problem), W=matrix)
+    with pytest.raises(fclib.ProblemError, match=r"^jacobian"):
+        dense(matrix, "jacobian", (6, 6))
+    with pytest.raises(fclib.ProblemError, match=r"^W"):
+        problem.replace(W=matrix)
 
 
 def test_a_sparse_vector_is_no_matrix() -> None:

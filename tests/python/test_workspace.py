@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,6 +45,19 @@ def test_wrong_names_are_refused() -> None:
     for wrong in ([1, 2], [0.5] * 4, "abcd"):
         with pytest.raises(fclib.ProblemError, match="contacts: expected nc = 4"):
             workspace.solve(problem, wrong)
+    odd: list[Any] = [[[1], [2, 3], 4, 5], np.full(4, 2**63, dtype=np.uint64)]
+    for names in odd:
+        with pytest.raises(fclib.ProblemError, match="contacts: "):
+            workspace.solve(problem, contacts=names)
+    with pytest.raises(fclib.ProblemError, match="problem: a NoneType is none of"):
+        workspace.solve(None)  # type: ignore[arg-type]
+    with pytest.raises(fclib.OptionError, match="tol: 'small' is not a number"):
+        fclib.Workspace(tol="small")  # type: ignore[arg-type]
+    with pytest.raises(fclib.OptionError, match="tol: inf is not a finite number"):
+        fclib.Workspace(tol=np.inf)
+    workspace.tol = "small"  # type: ignore[assignment]
+    with pytest.raises(fclib.OptionError, match="tol: 'small' is not a number"):
+        workspace.solve(problem)
     with pytest.raises(fclib.OptionError):
         fclib.Workspace(tol=-1)
 

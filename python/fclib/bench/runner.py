@@ -222,15 +222,9 @@ def run_campaign(
     if not processes.supported():
         raise _core.Error("fclib bench needs Linux: its limits are kept by way of /proc")
     Path(store).parent.mkdir(parents=True, exist_ok=True)
-    new = not Path(store).exists()
     with Store(store) as opened:
         runs = opened.mended()
-        try:
-            plan = campaign.plan_by_key(opened, tell)
-        except (_core.Error, ImportError):
-            if new:
-                opened.discard()
-            raise
+        plan = campaign.plan_by_key(opened, tell)
         if retry and opened.forget(plan, retry):
             runs = opened.mended()
         there = set(runs["key"].values)

@@ -226,8 +226,12 @@ class Store:
         self.read_only = self.path.exists() and not (
             os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
         )
-        if not create and not self.path.stat().st_size:
+        self._made = not self.path.exists()
+        size = 0 if self._made else self.path.stat().st_size
+        if not create and not size:
             raise StoreError(f"{self.path}: is empty, and no store")
+        if size == 1:  # SQLite takes it for an empty file, and writes over it
+            raise StoreError(f"{self.path}: is no database, and no store")
         try:
             self.db = sqlite3.connect(
                 # WAL mode writes beside the file, even to read it
@@ -243,7 +247,7 @@ class Store:
         except sqlite3.OperationalError as error:
             raise explained(self.path, error) from None
         try:
-            self._prepare()
+            self._prepare(create)
         except DamagedError as error:
             self.db.close()
             raise DamagedError(f"{error}; {self._saved()}") from None
@@ -251,7 +255,7 @@ class Store:
             self.db.close()
             raise
 
-    def _prepare(self) -> None:
+    def _prepare(self, create: bool) -> None:
         db = self.db
         db.execute("PRAGMA trusted_schema = OFF")
         self._refuse_foreign()
@@ -268,6 +272,8 @@ class Store:
             (word,) = db.execute("PRAGMA quick_check(1)").fetchone()
             if word != "ok":
                 raise DamagedError(f"{self.path}: is damaged: {_one_line(word)}")
+        if empty and not create:
+            raise StoreError(f"{self.path}: is a database without tables, and no store")
         if self.read_only:
             if empty:
                 raise StoreError(f"{self.path}: is empty, and cannot be written")
@@ -346,7 +352,7 @@ class Store:
             StoreError: nothing can be read.
         """
         made = cls.__new__(cls)
-        made.path, made.read_only, made._ids = Path(path), True, {}
+        made.path, made.read_only, made._made, made._ids = Path(path), True, False, {}
         made.db = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
         source = sqlite3.connect(f"{made.path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
         # a damaged text is read as bytes, and then has another checksum
@@ -469,16 +475,23 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None and self._made:  # what could not begin leaves no store
+            self._discard()
+        else:
+            self.close()
 
     def close(self) -> None:
         """Close the file."""
         self.db.close()
 
-    def discard(self) -> None:
-        """Close the file, and remove it if no campaign was ever begun in it."""
-        begun = self.db.execute("SELECT 1 FROM campaigns LIMIT 1").fetchone()
+    def _discard(self) -> None:
+        """Close the file, and remove it if nothing was ever put into it."""
+        query = "SELECT 1 FROM campaigns UNION ALL SELECT 1 FROM runs LIMIT 1"
+        try:
+            begun = bool(self.db.execute(query).fetchone())
+        except StoreError:  # the first error says more
+            begun = True
         self.close()
         if not begun:
             self.path.unlink(missing_ok=True)

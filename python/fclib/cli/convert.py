@@ -54,6 +54,7 @@ class Request:
     storage: Storage | None
     kind: str | None
     force: bool
+    folder: Path | None  # made if needed
 
 
 def format_of(path: Path) -> Format:
@@ -170,6 +171,8 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
                 f"{source}: the matrices of a {problem.kind} problem are {stored} in {file}, "
                 f"not {request.storage.value}"
             )
+    if request.folder is not None:  # only now: what cannot be read leaves no folder
+        request.folder.mkdir(parents=True, exist_ok=True)
     if output is Format.hdf5:
         dense = request.storage is Storage.dense
         fclib.write(target, problem, result.solution, result.guesses, dense=dense)
@@ -287,7 +290,7 @@ def command(
         sources, targets, chosen = targets_of(files, out_dir, output)
     except ValueError as error:
         usage_error(error)
-    request = Request(form, storage, kind, force)
+    request = Request(form, storage, kind, force, out_dir)
     report = Report(as_json, hidden=("n", "format", "matrix_info"))
     if out_dir is not None and out_dir.exists() and not out_dir.is_dir():
         report.error(out_dir, fclib.Error(f"{out_dir}: cannot be written: it is no folder"))
@@ -296,8 +299,6 @@ def command(
     for source in each_file(sources, "converting"):
         target = target_of[source]
         try:
-            if out_dir is not None:
-                out_dir.mkdir(parents=True, exist_ok=True)
             record = convert(source, target, chosen, request)
         except fclib.Error as error:
             named = str(error).startswith((f"{source}: ", f"{target}: "))

@@ -354,7 +354,8 @@ def filled(values: npt.ArrayLike | None, size: int, name: str) -> Vector:
 
 def dense(matrix: Any, name: str, shape: tuple[int | None, int]) -> Vector:
     """A matrix as an array of finite doubles. ValueError if it has another shape."""
-    array = np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix, dtype=float)
+    known = _core.matrix_from(matrix, name).toarray() if sp.issparse(matrix) else matrix
+    array = np.asarray(known, dtype=float)
     if array.size == 0:
         array = array.reshape((shape[0] or 0, shape[1]))
     if array.ndim != 2 or array.shape[1] != shape[1] or shape[0] not in (None, len(array)):

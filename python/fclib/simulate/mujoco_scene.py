@@ -70,8 +70,11 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
 
     m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # these are for MuJoCo's own step only, and "override" changes margins, distances and friction
     enable = mujoco.mjtEnableBit
+    dropped = [f"MuJoCo's compiler: {line}" for line in lines]
+    if m.opt.enableflags & enable.mjENBL_OVERRIDE:
+        dropped.append("override (each contact keeps its own friction, margin, solref and solimp)")
+    # these are for MuJoCo's own step only, and "override" changes margins, distances and friction
     for flag in (
         enable.mjENBL_OVERRIDE,
         enable.mjENBL_SLEEP,
@@ -83,7 +86,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
         flag = IGNORABLE[feature]
         if flag is not None:
             m.opt.disableflags |= int(flag)
-    return m, tuple(dict.fromkeys(f"MuJoCo's compiler: {line}" for line in lines))
+    return m, tuple(dict.fromkeys(dropped))
 
 
 def compiled(scene: Scene) -> Any:
@@ -167,22 +170,37 @@ def bottom(m: Any, d: Any, geom: int) -> float:
 
 def refuse_no_numbers(scene: Scene, m: Any) -> None:
     """Raise ValueError if data of a model are not finite: MuJoCo accepts them."""
-    for kind, count in (("geom", m.ngeom), ("body", m.nbody), ("jnt", m.njnt), ("dof", m.nv)):
-        for name in NUMBERS[kind]:
-            values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
-            values = values.reshape(count, values.size // max(count, 1))
-            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-            if bad.size:
-                refuse(scene, m, kind, int(bad[0]), name, values[bad[0]])
-    for i in np.flatnonzero(~np.isfinite(m.pair_friction).all(axis=1)):
-        raise ValueError(f"{scene.name}: pair {i}: its friction is not finite")
+    for names in (NUMBERS, numbers_of(m)):  # what others follow from comes first
+        for kind, own in names.items():
+            for name in own:
+                values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
+                if np.isfinite(values).all():
+                    continue
+                values = values.reshape(len(values), -1)
+                bad = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+                refuse(scene, m, kind, bad, name, values[bad])
+    for name in ("wind", "density", "viscosity"):
+        if not np.isfinite(getattr(m.opt, name)).all():
+            raise ValueError(f"{scene.name}: option: its {name} is not finite")
+
+
+def numbers_of(m: Any) -> dict[str, list[str]]:
+    """All arrays of numbers that a model has of its elements, by the kind of element."""
+    return {
+        kind: [
+            name.removeprefix(f"{kind}_")
+            for name in dir(m)
+            if name.startswith(f"{kind}_") and getattr(m, name).dtype.kind == "f"
+        ]
+        for kind in (*NUMBERS, "tendon", "actuator", "eq", "pair", "key")
+    }
 
 
 def refuse(scene: Scene, m: Any, kind: str, i: int, name: str, values: Vector) -> None:
     """Raise ValueError if a value is not finite."""
-    word = {"geom": "geom", "body": "body"}.get(kind, "joint")
+    word = {"jnt": "joint", "dof": "joint", "eq": "equality", "key": "keyframe"}.get(kind, kind)
     number = int(m.dof_jntid[i]) if kind == "dof" else i
-    own = getattr(m, word)(number).name
+    own = getattr(m, {"dof": "jnt"}.get(kind, kind))(number).name
     raise ValueError(
         f"{scene.name}: {word} {own or number}: its {name} is not finite"
         f" ({' '.join(f'{value:g}' for value in values)})"
@@ -241,6 +259,10 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
         lost.append("anisotropic friction (the mean of two coefficients)")
     if softened(m, touching):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
+    if softened_friction(m):
+        lost.append("solref and solimp of dry friction (a joint or a contact sticks without creep)")
+    if m.nplastic:
+        lost.append("springs that yield (they stay elastic)")
     # a family explains its own parameter
     if widened(m, touching) and "margin" not in scene.parameters:
         lost.append("margins (bodies touch where their surfaces do, limits act where they are)")
@@ -261,6 +283,10 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     return tuple(lost)
 
 
+# solref and solimp, MuJoCo's defaults
+USUAL: Final = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
+
+
 def softened(m: Any, touching: Any) -> bool:
     """Whether a model sets other compliances than MuJoCo's defaults."""
     limited, tied = m.jnt_limited.astype(bool), m.eq_active0.astype(bool)
@@ -271,8 +297,20 @@ def softened(m: Any, touching: Any) -> bool:
         np.hstack((m.tendon_solref_lim, m.tendon_solimp_lim))[m.tendon_limited.astype(bool)],
         np.hstack((m.eq_solref, m.eq_solimp))[tied],
     )
-    usual = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
-    return any(bool((own != usual).any()) for own in rows)
+    return any(bool((own != USUAL).any()) for own in rows)
+
+
+def softened_friction(m: Any) -> bool:
+    """Whether a model sets other compliances of dry friction than those of its other rows."""
+    if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS:
+        rows: tuple[Any, ...] = ()
+    else:
+        rows = (
+            np.hstack((m.dof_solref, m.dof_solimp))[m.dof_frictionloss > 0],
+            np.hstack((m.tendon_solref_fri, m.tendon_solimp_fri))[m.tendon_frictionloss > 0],
+        )
+    # zeros: as the normal component
+    return any(bool((own != USUAL).any()) for own in rows) or bool(m.pair_solreffriction.any())
 
 
 def widened(m: Any, touching: Any) -> bool:

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import importlib
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,12 @@ def test_ranges_that_exclude_each_other_are_found() -> None:
     assert not list(table.exclusions(row | {"contacts": "9 to 28"}))
     assert not list(table.exclusions(row | {"dof": "48 to 60"}))
     assert not list(table.exclusions(row | {"density": "0.4 to 1.3"}))
+
+
+def test_pairs_of_bodies_are_counted_whatever_their_order() -> None:
+    body = np.array([[0, 1], [1, 0], [0, 1], [-1, 0]])
+    problem = SimpleNamespace(n=12, nc=4, contacts=SimpleNamespace(body=body))
+    assert table.touching(problem) == {"pairs of a body": "1", "contacts of a pair": "2"}
 
 
 def row_of(number: int, contacts: int, **figures: Any) -> Any:

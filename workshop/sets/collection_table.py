@@ -17,7 +17,8 @@ is off. workshop/tables/published_beside_ours.py makes the table of both.
 figures, to the same tenth: density is three components of a contact over the degrees of freedom.
 
 --growth prints, of the stored states of families those that have a quarter more degrees of freedom
-than the one before: how the conditioning grows with the size.
+than the one before: how the conditioning grows with the size, how many pairs of bodies touch for
+each body (of six degrees of freedom), and in how many contacts.
 
 published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
 contact problems with Coulomb friction: formulations and numerical comparisons, 2018, table
@@ -186,7 +187,17 @@ def growth(name: str, limit: int) -> Iterator[dict[str, str]]:
             "density": f"{problem.m / problem.n:.3g}",
             "rank ratio": f"{ratio:.3g}",
             "conditioning": span([conditioning]),
+            **touching(problem),
         }
+
+
+def touching(problem: Any) -> dict[str, str]:
+    """How many pairs of bodies touch for each body that moves, and in how many contacts each."""
+    pairs = {tuple(sorted(pair)) for pair in np.asarray(problem.contacts.body).tolist()}
+    return {
+        "pairs of a body": f"{6 * len(pairs) / problem.n:.3g}",
+        "contacts of a pair": f"{problem.nc / len(pairs):.3g}",
+    }
 
 
 def line(

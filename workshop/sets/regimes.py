@@ -148,7 +148,7 @@ REGIMES: dict[str, Regime] = {
         "Bridge_PR",
         {"load": 0.0, "slabs": 3, "spread": 5.0, "activation": 5e-3, "all_bodies": True}
         | {"time_step": 1.5e-3},
-        keep=54,
+        keep=60,
         steps=500,
         way=EXACT,
         by=("density", "rank_ratio", "conditioning"),
@@ -189,7 +189,7 @@ REGIMES: dict[str, Regime] = {
         STEEL
         | {"young": 8e7, "poisson": 0.499, "density": 1100.0, "yaw": 1.57}
         | {"push": 7e3, "pressure": 1e4, "rise": 0.05, "bed": 1e11},
-        keep=54,
+        keep=60,
         steps=60,
         way=EXACT,
         by=("conditioning",),

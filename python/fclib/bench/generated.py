@@ -182,7 +182,7 @@ def sampled(
     numbers = plan.numbers().tolist()
     if plan.trajectory is None or count >= len(numbers):
         return []
-    # a reference takes longer than the runs that it would not serve
+    # runs need no references, which take longer than they do
     plan = dataclasses.replace(plan.only(sample(numbers, count)), references=False)
     digest = hashlib.sha256(plan.fingerprint().encode()).hexdigest()[:16]
     folder = cache_folder() / "samples" / digest

@@ -1,6 +1,7 @@
 """The set `standard`: how it is chosen, and how its problems stand."""
 
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -407,6 +408,45 @@ def test_part_of_a_trajectory_is_some_of_its_problems(tmp_path: Path) -> None:
     assert (part.origin["collection"], part.origin["version"]) == ("some", "3")
     assert fclib.digest(part.problem(1).problem) == states.digest[states.index(150)]
     assert target.stat().st_size < path.stat().st_size
+
+
+def test_chosen_states_are_stored_once(tmp_path: Path) -> None:
+    path = published.path_of("rt444/KaplasTower", set_index.version_of("rt444/KaplasTower"))
+    if path is None:
+        pytest.skip("its states are not stored here")
+    base = tmp_path / "trajectories"
+    source = "rt444/KaplasTower-1.trajectory"
+    (base / source).parent.mkdir(parents=True)
+    shutil.copy(path, base / source)
+    states = trajectory.read(path)
+    part = trajectory.part(states, [150, 7], "some", "3")
+    part = replace(part, guess=(None, np.ones(3)))
+    target = base / "some" / "KaplasTower-3.trajectory"
+    trajectory.write(target, part, source=source)
+    assert target.stat().st_size < 2000
+    again = trajectory.read(target)
+    assert again.origin == part.origin
+    assert again.digest == part.digest
+    assert again.guess[0] is None
+    assert again.guess[1].tolist() == [1, 1, 1]
+    for name in ("number", "step", "position", "velocity", "sketch"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(part, name))
+    assert fclib.digest(again.problem(1).problem) == part.digest[1]
+    assert trajectory.read_digests(target) == dict(zip([7, 150], part.digest, strict=True))
+    assert trajectory.read_origin(target) == (again.scene, part.origin)
+
+    # the file of the states has other problems of these numbers, names this one, or is not there
+    (base / source).unlink()
+    trajectory.write(base / source, replace(states, digest=states.digest[::-1]))
+    with pytest.raises(trajectory.TrajectoryError, match="has other problems of these numbers"):
+        trajectory.read(target)
+    (base / source).unlink()
+    trajectory.write(base / source, part, source="some/KaplasTower-3.trajectory")
+    with pytest.raises(trajectory.TrajectoryError, match="damaged"):
+        trajectory.read(target)
+    (base / source).unlink()
+    with pytest.raises(trajectory.TrajectoryError, match=f"{source}, which is not there"):
+        trajectory.read(target)
 
 
 # ---- lists of earlier versions

@@ -30,10 +30,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
 import fclib
 from fclib import _digest, scenes
@@ -43,6 +45,8 @@ from fclib.collections.set_index import Choice
 from fclib.simulate import Contacts, Model, model_of, problem_at, scheme_of, simulate
 from workshop.sets import collection_table
 
+Vector: TypeAlias = npt.NDArray[np.float64]
+States: TypeAlias = tuple[Vector, Vector]  # a position and a velocity
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
 DEEPEST = 0.02  # penetration of a state that is kept, of the smallest body's diameter
 SET = "rr9118"  # of the problems of one contact
@@ -68,6 +72,7 @@ class Regime:
     version: str = "1"  # of the trajectory
     collection: str = "rr9118"  # the set
     scene: str = ""  # the family of its scene, if the set calls it otherwise
+    spheres: bool = False  # all bodies are free spheres: `plainest` states of them
 
 
 STEEL = {"young": 2e11, "density": 7800.0, "time_step": 0.0125}
@@ -210,27 +215,33 @@ REGIMES: dict[str, Regime] = {
     "Spheres": Regime(
         "Spheres",
         COLUMN | {"time_step": 1e-3},
-        keep=20,
+        keep=30,
         steps=8000,
         every=10,
+        grows=True,
+        spheres=True,
         collection="fclib2024",
         scene="SpheresInABox",
     ),
     "Spheres1mm": Regime(
         "Spheres_1mm",
         MILLIMETRES,
-        keep=8,
+        keep=42,
         steps=5000,
         every=10,
+        grows=True,
+        spheres=True,
         collection="fclib2024",
         scene="SpheresInABox",
     ),
     "Spheres1mmScaled": Regime(
         "Spheres_1mm_scaled",
         SCALED,
-        keep=8,
+        keep=38,
         steps=5000,
         every=10,
+        grows=True,
+        spheres=True,
         collection="fclib2024",
         scene="SpheresInABox",
     ),
@@ -307,6 +318,26 @@ def depth(contacts: Contacts, model: Model) -> float:
     return -float(contacts.gap.min(initial=0.0)) / (2 * size) if size else 0.0
 
 
+def plainest(position: Vector, velocity: Vector, step: float, exponent: int) -> States:
+    """The same state of free spheres in fewer digits: what their problem does not depend on goes.
+
+    A sphere's orientation is none that anything sees, so its frame is the world's. Velocities are
+    multiples of a quantum by which nothing moves further in a step than the quantum of places.
+
+    Args:
+        position: place [m] and quaternion of each sphere, (7 N).
+        velocity: of each sphere in the world's frame [m/s], and in its own [rad/s], (6 N).
+        step: the time step h [s].
+        exponent: the quantum of places is 2^exponent m.
+    """
+    places, twists = position.reshape(-1, 7).copy(), velocity.reshape(-1, 6).copy()
+    frames = Rotation.from_quat(places[:, [4, 5, 6, 3]])
+    places[:, 3:] = (1.0, 0.0, 0.0, 0.0)
+    twists[:, 3:] = frames.apply(twists[:, 3:])
+    coarser = exponent - math.ceil(math.log2(step))
+    return places.ravel(), trajectory.rounded(twists.ravel(), coarser)
+
+
 def newest(source: str) -> trajectory.Trajectory:
     """The newest stored trajectory of SET/FAMILY."""
     path = published.path_of(source, published.versions(source)[-1])
@@ -353,7 +384,10 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
             )
         if step.index >= first and step.problem.nc:
             if number % regime.every == 0:
-                yield row(number, step.index, step.start.position, step.start.velocity)
+                state = step.start.position, step.start.velocity
+                if regime.spheres:
+                    state = plainest(*state, model.time_step, exponent)
+                yield row(number, step.index, *state)
             number += 1
 
 

@@ -37,7 +37,7 @@ import numpy.typing as npt
 from fclib import _digest, _solve
 from fclib._files import write_text
 from fclib._judge import TOLERANCE, trivial
-from fclib.collections import catalog, ratings, trajectory
+from fclib.collections import catalog, published, ratings, trajectory
 from fclib.collections.build import facts_of, guess_for, item_of
 from fclib.collections.set_index import Choice
 from workshop.sets import features
@@ -669,7 +669,7 @@ def publish(
     version: str,
     folder: Path,
 ) -> list[Path]:
-    """Store the states of chosen problems as those of a set.
+    """Store the states of chosen problems as those of a set, or where they are stored already.
 
     A family whose problems are stored already, in any version, is left as it is. Raises OSError.
     """
@@ -687,7 +687,8 @@ def publish(
                 f"{target}: has other problems; choose a further version (--version)"
             )
         part = trajectory.part(found.states, own, name, version)
-        trajectory.write(target, replace(part, guess=guesses_of(found, sorted(own))))
+        guessed = replace(part, guess=guesses_of(found, sorted(own)))
+        trajectory.write(target, guessed, source=published.name_of(found.plan.trajectory))
         written.append(target)
     return written
 

@@ -37,6 +37,10 @@ of states that another engine handed over (`handed.py`), with C contacts in all,
 Integers are stored as second differences along K, those of one coordinate one after the other, in
 zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first: 4.5 MB for
 the 4,934 states of RT-0444's families; as floats of 32 bits they take 7.8 MB.
+
+No state is stored twice. A file of problems that a set chose from a stored family names the file of
+their states, SET/FAMILY-VERSION.trajectory below the same folder, and has guess, guesses, number
+and digest only.
 """
 
 from __future__ import annotations
@@ -246,42 +250,42 @@ def rounded(values: Vector, exponent: int) -> Vector:
 # ---- files
 
 
-def write(path: Path, trajectory: Trajectory) -> None:
+def write(path: Path, trajectory: Trajectory, source: str = "") -> None:
     """Write a trajectory; equal ones make equal files. Raises OSError, FileExistsError.
 
     A file is never rewritten: another trajectory is another version, in a file of its own.
+
+    Args:
+        path: the file; with a source it is BASE/SET/FAMILY-VERSION.trajectory.
+        trajectory: its content.
+        source: the file below BASE of which it is a `part`, and which has its states.
     """
+    head: dict[str, Any] = {
+        "format": FORMAT,
+        "origin": dict(trajectory.origin),
+        "problems": len(trajectory),
+    }
     arrays: dict[str, bytes] = {}
-    shapes: dict[str, Any] = {}
-    columns = [(name, getattr(trajectory, name), DIFFERENCES) for name in ("position", "velocity")]
-    if trajectory.handed is not None:
-        # contacts that follow each other are no steps
-        columns += [(name, getattr(trajectory.handed, name), 0) for name in NUMBERS]
-        for name in INTEGERS:
-            arrays[name] = getattr(trajectory.handed, name).astype("<i4").tobytes()
-    for name, values, order in columns:
-        values = values.reshape(len(values), math.prod(values.shape[1:]))
-        arrays[name], width = packed(values, trajectory.exponent, order)
-        shapes[name] = {"shape": list(values.shape), "bytes": width}
+    if source:
+        head["source"] = source
+    else:
+        arrays, shapes = states_of(trajectory)
+        head |= {"exponent": trajectory.exponent, "arrays": shapes}
+        head["scene"] = record(trajectory.scene)
+        if trajectory.handed is not None:
+            head["handed"] = trajectory.handed.head()
     if trajectory.guess:
         known = [np.zeros(0) if one is None else one for one in trajectory.guess]
         counts = [-1 if one is None else len(one) for one in trajectory.guess]
         arrays["guess"] = np.concatenate(known).astype("<f4").tobytes()
         arrays["guesses"] = np.array(counts, "<i4").tobytes()
     arrays["number"] = trajectory.number.astype("<i8").tobytes()
-    arrays["step"] = trajectory.step.astype("<i8").tobytes()
-    for name in ("digest", "structure"):
-        arrays[name] = bytes.fromhex("".join(getattr(trajectory, name)))
-    arrays["sketch"] = trajectory.sketch.astype("<f8").tobytes()
-    head = {
-        "format": FORMAT,
-        "origin": dict(trajectory.origin),
-        "exponent": trajectory.exponent,
-        "problems": len(trajectory),
-        "arrays": shapes,
-        "scene": record(trajectory.scene),
-        **({"handed": trajectory.handed.head()} if trajectory.handed is not None else {}),
-    }
+    if not source:
+        arrays["step"] = trajectory.step.astype("<i8").tobytes()
+    arrays["digest"] = bytes.fromhex("".join(trajectory.digest))
+    if not source:
+        arrays["structure"] = bytes.fromhex("".join(trajectory.structure))
+        arrays["sketch"] = trajectory.sketch.astype("<f8").tobytes()
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists():
         raise FileExistsError(f"{path}: is there already, and a trajectory is never rewritten")
@@ -298,6 +302,23 @@ def write(path: Path, trajectory: Trajectory) -> None:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def states_of(trajectory: Trajectory) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """The states and contacts of a trajectory as bytes, and the shapes of their arrays."""
+    arrays: dict[str, bytes] = {}
+    shapes: dict[str, Any] = {}
+    columns = [(name, getattr(trajectory, name), DIFFERENCES) for name in ("position", "velocity")]
+    if trajectory.handed is not None:
+        # contacts that follow each other are no steps
+        columns += [(name, getattr(trajectory.handed, name), 0) for name in NUMBERS]
+        for name in INTEGERS:
+            arrays[name] = getattr(trajectory.handed, name).astype("<i4").tobytes()
+    for name, values, order in columns:
+        values = values.reshape(len(values), math.prod(values.shape[1:]))
+        arrays[name], width = packed(values, trajectory.exponent, order)
+        shapes[name] = {"shape": list(values.shape), "bytes": width}
+    return arrays, shapes
 
 
 def head_of(path: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
@@ -317,7 +338,10 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
             yield archive
-    except (zipfile.BadZipFile, LZMAError, KeyError, TypeError, EOFError, ValueError) as error:
+    except (
+        *(zipfile.BadZipFile, LZMAError, KeyError, TypeError, EOFError, ValueError),
+        RecursionError,  # two files that name each other as the source
+    ) as error:
         if isinstance(error, TrajectoryError):
             raise
         raise TrajectoryError(f"{path}: is no trajectory, or a damaged one: {error}") from error
@@ -327,7 +351,17 @@ def read_origin(path: Path) -> tuple[Scene, dict[str, Any]]:
     """The scene of a trajectory and its origin. OSError, TrajectoryError."""
     with opened(path) as archive:
         head = head_of(path, archive)
-        return scene_of(head["scene"]), head["origin"]
+    if "source" in head:
+        return read_origin(source_of(path, head))[0], head["origin"]
+    return scene_of(head["scene"]), head["origin"]
+
+
+def source_of(path: Path, head: Mapping[str, Any]) -> Path:
+    """The file with the states of one that has none. Raises TrajectoryError if it is not there."""
+    source = path.parents[1] / head["source"]
+    if not source.is_file():
+        raise TrajectoryError(f"{path}: its states are in {source}, which is not there")
+    return source
 
 
 def read_digests(path: Path) -> dict[int, str]:
@@ -348,19 +382,7 @@ def read(path: Path) -> Trajectory:
             for entry in archive.namelist()
             if entry.endswith(".bin")
         }
-        count, exponent = head["problems"], head["exponent"]
-
-        def states(name: str, order: int = DIFFERENCES) -> Vector:
-            known = head["arrays"][name]
-            return unpacked(arrays[name], **known, exponent=exponent, order=order)
-
-        def contacts() -> Handed | None:
-            if "handed" not in head:
-                return None
-            own: dict[str, Any] = {name: states(name, 0) for name in NUMBERS}
-            own |= {name: np.frombuffer(arrays[name], "<i4").astype(int) for name in INTEGERS}
-            own |= {"gap": own["gap"].ravel(), "body": own["body"].reshape(-1, 2)}
-            return engines.of(head["handed"], **own)
+        count = head["problems"]
 
         def guesses() -> tuple[Vector | None, ...]:
             if "guesses" not in arrays:
@@ -374,11 +396,32 @@ def read(path: Path) -> Trajectory:
         def hexes(name: str) -> tuple[str, ...]:
             return tuple(arrays[name][32 * i : 32 * i + 32].hex() for i in range(count))
 
+        number = np.frombuffer(arrays["number"], "<i8").astype(np.int64)
+        if "source" in head:
+            source, own = source_of(path, head), head["origin"]
+            found = part(read(source), number, own["collection"], own["version"])
+            if found.digest != hexes("digest"):
+                raise TrajectoryError(f"{path}: {source} has other problems of these numbers")
+            return replace(found, origin=own, guess=guesses())
+        exponent = head["exponent"]
+
+        def states(name: str, order: int = DIFFERENCES) -> Vector:
+            known = head["arrays"][name]
+            return unpacked(arrays[name], **known, exponent=exponent, order=order)
+
+        def contacts() -> Handed | None:
+            if "handed" not in head:
+                return None
+            own: dict[str, Any] = {name: states(name, 0) for name in NUMBERS}
+            own |= {name: np.frombuffer(arrays[name], "<i4").astype(int) for name in INTEGERS}
+            own |= {"gap": own["gap"].ravel(), "body": own["body"].reshape(-1, 2)}
+            return engines.of(head["handed"], **own)
+
         return Trajectory(
             scene=scene_of(head["scene"]),
             origin=head["origin"],
             exponent=exponent,
-            number=np.frombuffer(arrays["number"], "<i8").astype(np.int64),
+            number=number,
             step=np.frombuffer(arrays["step"], "<i8").astype(np.int64),
             position=states("position"),
             velocity=states("velocity"),

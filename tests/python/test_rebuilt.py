@@ -1,0 +1,168 @@
+"""The authors' scenes: M, H, f and w of stored problems follow from their tables, by NumPy alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fclib.collections import published, trajectory
+
+COUNT = 10  # problems of a family
+EXACT = 1e-8  # of the largest entry
+ROUNDING = 2.0**-31  # of the tables' places and gaps [m]
+GRAVITY = {"handed": 9.80665, "own": 9.81}  # [m/s^2]
+
+
+def large(folder: str) -> Any:
+    return pytest.param(folder, marks=pytest.mark.long)
+
+
+FOLDERS = (
+    "rt444/BoxesStack",
+    large("rt444/Capsules"),
+    "rt444/Chain",
+    "rt444/KaplasTower",
+    "fclib2024/PrimitiveSoup",
+    "fclib2024/RollingSoup",
+    "fclib2024/SpheresPile",
+    large("fclib2024/Chute"),
+    large("fclib2024/RollingChute"),
+    large("fclib2024/Spheres"),
+    large("fclib2024/Spheres1mm"),
+    large("fclib2024/Spheres1mmScaled"),
+    "rr9118/Aqueduct",
+    "rr9118/Bridge",
+    "rr9118/Capsules",
+    "rr9118/Chain",
+    "rr9118/KaplasTower",
+    large("rr9118/PeriodicBox"),
+    large("rr9118/SpheresBox"),
+    large("rr9118/Chute1000"),
+    large("rr9118/Chute4000"),
+)
+
+
+def rotations(turn: Any) -> Any:
+    """The rotations of unit quaternions w, x, y, z: (k x 4) to (k x 3 x 3)."""
+    w, x, y, z = turn.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def crossing(vectors: Any) -> Any:
+    """The matrices of the products a x ...: (k x 3) to (k x 3 x 3)."""
+    return np.cross(vectors[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)
+
+
+def in_problem(problem: Any) -> Any:
+    """The bodies of a problem with six coordinates: all that move, or those with a contact.
+
+    The last one may be a plate on a slider, with one coordinate.
+    """
+    moving = np.flatnonzero(problem.bodies.moves)
+    if problem.n < 6 * (len(moving) - 1):
+        moving = np.intersect1d(moving, problem.contacts.body)
+    return moving[: problem.n // 6]
+
+
+def directions(problem: Any) -> Any:
+    """H: u is the velocity of the second body at the point, less the first's.
+
+    Rolling has two more rows: the spins about both tangents, as a velocity is their product with
+    the normal or not.
+    """
+    contacts, bodies = problem.contacts, problem.bodies
+    which, d = in_problem(problem), problem.m // problem.nc
+    place = np.full(len(bodies.moves), -1)
+    place[which] = np.arange(len(which))
+    frame = np.stack(
+        (contacts.normal, contacts.tangent, np.cross(contacts.normal, contacts.tangent)), axis=1
+    )
+    rows, columns, values = [], [], []
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        own = contacts.body[:, side]
+        there = np.flatnonzero((own >= 0) & (place[own] >= 0))
+        own = own[there]
+        arm = contacts.point[there] - bodies.place[own]
+        if bodies.period.size:
+            arm[:, :2] -= bodies.period * np.rint(arm[:, :2] / bodies.period)
+        turn = rotations(bodies.turn[own])
+        blocks = np.zeros((len(there), 6, d))
+        blocks[:, :3, :3] = frame[there].transpose(0, 2, 1)
+        blocks[:, 3:, :3] = (np.cross(arm[:, None], frame[there]) @ turn).transpose(0, 2, 1)
+        if d == 5:
+            blocks[:, 3:, 3:] = (frame[there, 1:] @ turn).transpose(0, 2, 1)
+        i = 6 * place[own][:, None, None] + np.arange(6)[:, None]
+        j = d * there[:, None, None] + np.arange(d)
+        rows.append(np.broadcast_to(i, blocks.shape).ravel())
+        columns.append(np.broadcast_to(j, blocks.shape).ravel())
+        values.append(sign * blocks.ravel())
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return sp.csc_array(entries, shape=(6 * len(which), problem.m))
+
+
+def largest(matrix: Any) -> float:
+    """The largest entry of an array or a sparse matrix."""
+    return float(np.abs(matrix.data if sp.issparse(matrix) else matrix).max(initial=0.0))
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_problems_are_rebuilt_from_their_tables(folder: str) -> None:
+    versions = published.versions(folder)
+    if not versions:
+        pytest.skip("its states are not stored here")
+    path = published.path_of(folder, versions[-1])
+    assert path is not None
+    states = trajectory.read(path)
+    if states.handed is None:
+        pytest.importorskip("mujoco")
+    scene, h = states.scene, states.time_step
+    places = np.unique(np.linspace(0, len(states) - 1, COUNT).round().astype(int))
+    assert len(places) == COUNT
+    for place in places.tolist():
+        problem: Any = states.problem(place).problem
+        bodies, which = problem.bodies, in_problem(problem)
+        n = 6 * len(which)
+        assert n in (problem.n, problem.n - 1)
+        H = directions(problem)
+        assert largest(H - problem.H[:n]) <= EXACT * max(1.0, largest(H))
+
+        axes = rotations(bodies.axes[which])
+        inertia = axes @ (bodies.inertia[which][:, :, None] * axes.transpose(0, 2, 1))
+        mass, twist = bodies.mass[which], bodies.velocity[:n].reshape(-1, 6)
+        omega = twist[:, 3:]
+        momentum = np.einsum("bij,bj->bi", inertia, omega)
+        blocks = np.zeros((len(which), 6, 6))
+        blocks[:, np.arange(3), np.arange(3)] = mass[:, None]
+        blocks[:, 3:, 3:] = inertia
+        if states.handed is not None or scene.gyroscopic:
+            # the derivative of the gyroscopic term h omega x J omega
+            change = crossing(omega) @ inertia - crossing(momentum)
+            blocks[:, 3:, 3:] += h * scene.theta * change
+        M = sp.block_diag(list(blocks), format="csc")
+        assert largest(M - problem.M[:n, :n]) <= EXACT * largest(M)
+
+        gravity = GRAVITY["own"] if states.handed is None else GRAVITY["handed"]
+        pushed = np.zeros_like(twist)
+        pushed[:, 2] = -h * mass * scene.parameters.get("gravity", gravity)
+        pushed[:, 3:] = -h * np.cross(omega, momentum)
+        f = M @ twist.ravel() + pushed.ravel()
+        assert largest(f - problem.f[:n]) <= EXACT * largest(f)
+
+        w = np.zeros((problem.nc, problem.m // problem.nc))
+        if scene.law == "gap":
+            speed = (problem.H.T @ bodies.velocity).reshape(w.shape)[:, 0]
+            middle = problem.contacts.gap + (1 - scene.theta) * h * speed
+            undone = states.origin["settings"]["stabilization"]
+            w[:, 0] = np.where(middle > 0, 1.0, undone) * middle / h
+        else:
+            assert scene.restitution == 0
+        # w has gaps by the time step
+        assert largest(w.ravel() - problem.w) <= EXACT * largest(w) + 1.1 * ROUNDING / h

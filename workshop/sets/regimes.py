@@ -43,6 +43,7 @@ from fclib.collections import published, set_index, trajectory
 from fclib.collections.plan import Simulation, evenly
 from fclib.collections.set_index import Choice
 from fclib.simulate import Contacts, Model, model_of, problem_at, scheme_of, simulate
+from fclib.simulate.rounding import PER_SIZE
 from workshop.sets import collection_table
 
 Vector: TypeAlias = npt.NDArray[np.float64]
@@ -201,16 +202,6 @@ REGIMES: dict[str, Regime] = {
         fill=True,
         version="3",
     ),
-    "LowWallFEM": Regime(
-        "LowWall_FEM",
-        {"mu": 0.83, "joint": 4e-3, "time_step": 1e-3},
-        keep=24,
-        steps=75,
-        by=("density",),
-        fill=True,
-        grows=True,
-        version="3",
-    ),
     "CubesH8x20": Regime("Cubes_H8_20", STEEL | {"upper": 1.0}, keep=1, steps=1, way=EXACT),
     "Spheres": Regime(
         "Spheres",
@@ -244,6 +235,16 @@ REGIMES: dict[str, Regime] = {
         spheres=True,
         collection="fclib2024",
         scene="SpheresInABox",
+    ),
+    "SpheresInPlates": Regime(
+        "945_SP_Box_PL",
+        {},
+        keep=29,
+        steps=77,
+        way=EXACT,
+        grows=True,
+        spheres=True,
+        collection="decks",
     ),
     "PrimitiveSoup": Regime(
         "PrimitiveSoup",
@@ -318,24 +319,29 @@ def depth(contacts: Contacts, model: Model) -> float:
     return -float(contacts.gap.min(initial=0.0)) / (2 * size) if size else 0.0
 
 
-def plainest(position: Vector, velocity: Vector, step: float, exponent: int) -> States:
+def plainest(position: Vector, velocity: Vector, step: float, size: float) -> States:
     """The same state of free spheres in fewer digits: what their problem does not depend on goes.
 
-    A sphere's orientation is none that anything sees, so its frame is the world's. Velocities are
-    multiples of a quantum by which nothing moves further in a step than the quantum of places.
+    A sphere's orientation is none that anything sees, so its frame is the world's. Places are
+    rounded to PER_SIZE of the size; velocities and spins so that their errors move no point of a
+    sphere further in a step.
 
     Args:
         position: place [m] and quaternion of each sphere, (7 N).
         velocity: of each sphere in the world's frame [m/s], and in its own [rad/s], (6 N).
         step: the time step h [s].
-        exponent: the quantum of places is 2^exponent m.
+        size: radius of the smallest sphere [m].
     """
     places, twists = position.reshape(-1, 7).copy(), velocity.reshape(-1, 6).copy()
     frames = Rotation.from_quat(places[:, [4, 5, 6, 3]])
+    finest = PER_SIZE + math.floor(math.log2(size))
+    moving = finest - math.ceil(math.log2(step))
+    places[:, :3] = trajectory.rounded(places[:, :3], finest)
     places[:, 3:] = (1.0, 0.0, 0.0, 0.0)
-    twists[:, 3:] = frames.apply(twists[:, 3:])
-    coarser = exponent - math.ceil(math.log2(step))
-    return places.ravel(), trajectory.rounded(twists.ravel(), coarser)
+    twists[:, :3] = trajectory.rounded(twists[:, :3], moving)
+    spins = frames.apply(twists[:, 3:])
+    twists[:, 3:] = trajectory.rounded(spins, moving - math.ceil(math.log2(size)))
+    return places.ravel(), twists.ravel()
 
 
 def newest(source: str) -> trajectory.Trajectory:
@@ -370,7 +376,7 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
             place = int(stored.number[k]), int(stored.step[k])
             yield row(*place, stored.position[k], stored.velocity[k])
         return
-    number, start = 0, time.process_time()
+    number, start, size = 0, time.process_time(), model.smallest_size or 0.0
     first = int(np.ceil(scene.begin / (scene.time_step or 1.0) - 1e-6))
     way = regime.way
     for step in simulate(scene, regime.steps, solver=way.solver, tol=way.tol, **way.options):
@@ -386,7 +392,7 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
             if number % regime.every == 0:
                 state = step.start.position, step.start.velocity
                 if regime.spheres:
-                    state = plainest(*state, model.time_step, exponent)
+                    state = plainest(*state, model.time_step, size)
                 yield row(number, step.index, *state)
             number += 1
 

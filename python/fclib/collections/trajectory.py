@@ -34,9 +34,9 @@ of states that another engine handed over (`handed.py`), with C contacts in all,
     point.bin (C x 3), normal.bin (C x 3), gap.bin (C)      integers of the quantum, as they are
     count.bin (K), body.bin (C x 2), feature.bin (C)        int32, little-endian
 
-Integers are stored as second differences along K, those of one coordinate one after the other, in
-zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first: 4.5 MB for
-the 4,934 states of RT-0444's families; as floats of 32 bits they take 7.8 MB.
+Integers are stored as second differences along K, or as they are if that is shorter: states may be
+far from each other, or of different roundings. Those of one coordinate stand one after the other,
+in zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first.
 
 No state is stored twice. A file of problems that a set chose from a stored family names the file of
 their states, SET/FAMILY-VERSION.trajectory below the same folder, and has guess, guesses, number
@@ -46,6 +46,7 @@ and digest only.
 from __future__ import annotations
 
 import json
+import lzma
 import math
 import os
 import zipfile
@@ -53,7 +54,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from lzma import LZMAError
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -80,7 +80,8 @@ SUFFIX: Final = ".trajectory"
 OWN: Final = f"states{SUFFIX}"  # name beside the problems of a build that simulated it
 EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # so that equal trajectories make equal files
 LARGEST: Final = 2**53  # integers that a double holds
-DIFFERENCES: Final = 2  # order of differences along the steps
+DIFFERENCES: Final = 2  # order of differences along the steps, if a file names no other
+ORDERS: Final = (DIFFERENCES, 0)  # those of which the shorter is stored
 # arrays of a trajectory, with a row for each state
 ARRAYS: Final = ("number", "step", "position", "velocity", "sketch")
 HEXES: Final = ("digest", "structure")
@@ -308,16 +309,19 @@ def states_of(trajectory: Trajectory) -> tuple[dict[str, bytes], dict[str, Any]]
     """The states and contacts of a trajectory as bytes, and the shapes of their arrays."""
     arrays: dict[str, bytes] = {}
     shapes: dict[str, Any] = {}
-    columns = [(name, getattr(trajectory, name), DIFFERENCES) for name in ("position", "velocity")]
+    columns = [(name, getattr(trajectory, name), ORDERS) for name in ("position", "velocity")]
     if trajectory.handed is not None:
         # contacts that follow each other are no steps
-        columns += [(name, getattr(trajectory.handed, name), 0) for name in NUMBERS]
+        columns += [(name, getattr(trajectory.handed, name), (0,)) for name in NUMBERS]
         for name in INTEGERS:
             arrays[name] = getattr(trajectory.handed, name).astype("<i4").tobytes()
-    for name, values, order in columns:
+    for name, values, orders in columns:
         values = values.reshape(len(values), math.prod(values.shape[1:]))
-        arrays[name], width = packed(values, trajectory.exponent, order)
+        found = [(*packed(values, trajectory.exponent, order), order) for order in orders]
+        arrays[name], width, order = min(found, key=lambda one: len(lzma.compress(one[0])))
         shapes[name] = {"shape": list(values.shape), "bytes": width}
+        if order != DIFFERENCES and len(orders) > 1:
+            shapes[name]["order"] = order
     return arrays, shapes
 
 
@@ -339,7 +343,7 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
         with zipfile.ZipFile(path) as archive:
             yield archive
     except (
-        *(zipfile.BadZipFile, LZMAError, KeyError, TypeError, EOFError, ValueError),
+        *(zipfile.BadZipFile, lzma.LZMAError, KeyError, TypeError, EOFError, ValueError),
         RecursionError,  # two files that name each other as the source
     ) as error:
         if isinstance(error, TrajectoryError):
@@ -406,8 +410,8 @@ def read(path: Path) -> Trajectory:
         exponent = head["exponent"]
 
         def states(name: str, order: int = DIFFERENCES) -> Vector:
-            known = head["arrays"][name]
-            return unpacked(arrays[name], **known, exponent=exponent, order=order)
+            known = {"order": order} | head["arrays"][name]
+            return unpacked(arrays[name], **known, exponent=exponent)
 
         def contacts() -> Handed | None:
             if "handed" not in head:

@@ -1,4 +1,4 @@
-"""The authors' scenes: M, H, f and w of stored problems follow from their tables, by NumPy alone."""
+"""M, H, f and w of the authors' scenes follow from the tables of their files, by NumPy alone."""
 
 from __future__ import annotations
 

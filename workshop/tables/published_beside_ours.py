@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import importlib
 from collections import defaultdict
 from collections.abc import Sequence
@@ -151,10 +152,11 @@ def report(ours: dict[str, Any], out: Path) -> None:
 def beside(ours: dict[str, Any], sample: int, limit: int) -> list[dict[str, str]]:
     """The rows of the sets, each with ours under it; families without a set come last."""
     table, left = [], dict(ours)
+    # some of ours stand under several sets
+    spectra = functools.cache(lambda name: collection_table.spectra(*ours[name], sample, limit))
 
     def row(name: str, published: dict[str, str] | None = None) -> dict[str, str]:
-        folder, rows = ours[name]
-        figures = collection_table.spectra(folder, rows, sample, limit)
+        rows, figures = ours[name][1], spectra(name)
         verdict = collection_table.within(published, rows, figures) if published else ""
         return collection_table.line(name, rows, figures, verdict)
 

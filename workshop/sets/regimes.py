@@ -12,7 +12,7 @@ regime that is as long as published is filled up to the published number by furt
 spread in time. A simulation made again is another one in its last digits, and in the end in all of
 them. So a regime that grows keeps the states that are stored, and takes further steps beside them.
 
-States in which a body is more than DEEPEST in another are left out.
+States in which a body is deeper in another than its regime allows are left out.
 
 With the name ChuteLocalProblems it writes OUT/chute_local_problems.json from the stored states.
 
@@ -49,7 +49,7 @@ from workshop.sets import collection_table
 Vector: TypeAlias = npt.NDArray[np.float64]
 States: TypeAlias = tuple[Vector, Vector]  # a position and a velocity
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
-DEEPEST = 0.02  # penetration of a state that is kept, of the smallest body's diameter
+DEEPEST = 0.02
 SET = "rr9118"  # of the problems of one contact
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 WAY = Simulation(solver="nsgs", tol=1e-3, options={"max_iterations": 100})
@@ -73,6 +73,8 @@ class Regime:
     version: str = "1"  # of the trajectory
     collection: str = "rr9118"  # the set
     scene: str = ""  # the family of its scene, if the set calls it otherwise
+    # penetration of a state that is kept, of the smallest body's diameter; some laws leave more
+    deepest: float = DEEPEST
     spheres: bool = False  # all bodies are free spheres: `plainest` states of them
 
 
@@ -239,9 +241,9 @@ REGIMES: dict[str, Regime] = {
     "SpheresInPlates": Regime(
         "945_SP_Box_PL",
         {},
-        keep=29,
-        steps=77,
-        way=EXACT,
+        keep=20,
+        steps=500,
+        deepest=0.2,
         grows=True,
         spheres=True,
         collection="decks",
@@ -419,7 +421,7 @@ def chosen(found: list[Row], regime: Regime, there: int = 0) -> list[Row]:
         value = float(getattr(row, name))
         return math.log(value) if name == "conditioning" else value
 
-    inside = [row for row in found if row.depth <= DEEPEST]
+    inside = [row for row in found if row.depth <= regime.deepest]
     for name in names:
         low, high = bounds(name)
         if name == "conditioning":

@@ -32,7 +32,7 @@ class SpheresInPlates:
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90; the sizes' order is chosen here"
     friction: ClassVar[str] = "Coulomb between spheres, none on the plates"
     collection: ClassVar[str] = "decks"
-    problems: ClassVar[int] = 77
+    problems: ClassVar[int] = 500
 
     columns: int = parameter(15, "1", "spheres along x, at least 1")
     rows: int = parameter(9, "1", "spheres along y, at least 1")

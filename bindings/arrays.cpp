@@ -25,7 +25,9 @@ using Contiguous = nb::ndarray<const Number, nb::ndim<1>, nb::c_contig, nb::devi
 
 /// Whether the object is an array of NumPy itself: those of subclasses may have hidden entries.
 bool is_plain_array(nb::handle object) {
-  return object.type().is(nb::module_::import_("numpy").attr("ndarray"));
+  static const nb::handle array =
+      nb::object(nb::module_::import_("numpy").attr("ndarray")).release();
+  return object.type().is(array);
 }
 
 /// The object as a contiguous NumPy array of a type. It is copied only if it is not one already.

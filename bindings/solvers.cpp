@@ -20,6 +20,7 @@
 #include "fingerprints.hpp"
 #include "module.hpp"
 #include "solve/driver.hpp"
+#include "stepping/rest.hpp"
 
 namespace fclib::bindings {
 
@@ -90,7 +91,7 @@ void bind_solve(nb::module_& m) {
       [](const nb::object& problem, const Solver& solver, double tolerance,
          std::int64_t max_iterations, double time_limit, const nb::dict& options,
          const nb::object& guess, const nb::object& callback, bool history, bool natural,
-         const nb::object& clock) {
+         const nb::object& clock, std::optional<double> still) {
         Settings settings{.tolerance = tolerance,
                           .merit = natural ? MeritKind::natural : MeritKind::both,
                           .max_iterations = max_iterations,
@@ -102,24 +103,34 @@ void bind_solve(nb::module_& m) {
         OptionValues values;
         if (options.size() > 0) values = nb::cast<OptionValues>(options);
         const Solution start = guess.is_none() ? Solution{} : solution_from(guess, "guess");
-        return visit_problem(problem, [&](const auto& given) {
+        return visit_problem(problem, [&]<class P>(const P& given) {
+          Preference prefer;
+          if constexpr (std::derived_from<P, GlobalProblem>) {
+            if (still) {
+              prefer = [&](const Solution& found) {
+                return stepping::nearest_at_rest(given, found, start.r, *still);
+              };
+            }
+          }
           if (!guess.is_none()) {  // to the driver no entries are no guess
             detail::require_size(static_cast<Index>(start.r.size()), given.size(Dim::m), Dim::m,
                                  "guess r", "entries");
           }
           const Unlocked unlocked;
-          return solve(given, solver, settings, values, start);
+          return solve(given, solver, settings, values, start, prefer);
         });
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
       "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
-      "clock"_a.none() = nb::none(),
+      "clock"_a.none() = nb::none(), "still"_a.none() = nb::none(),
       nb::sig(("def solve(problem: " + problem_union() +
                ", solver: SolverInfo, tolerance: float, max_iterations: int, time_limit: float, "
                "options: collections.abc.Mapping[str, bool | int | float | str], "
                "guess: object | None, callback: object | None, history: bool, natural: bool, "
-               "clock: object | None = None) -> Result")
-                  .c_str()));
+               "clock: object | None = None, still: float | None = None) -> Result")
+                  .c_str()),
+      "With `still`, a relative velocity: if the solution of a global problem took iterations and\n"
+      "its bodies are slower, it is solved again from the reactions at rest nearest to the guess.");
 }
 
 nb::object history_of(const Result& result) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 #include <type_traits>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,17 @@ using Tuple = nb::typed<nb::tuple, nb::any, nb::ellipsis>;
 using Doubles = Buffer<const double>;
 using Integers = Buffer<const std::int64_t>;
 using Small = Buffer<const std::int32_t>;
+
+/// An attribute of the name, which is text of the program. Python finds it without a search through
+/// the classes only if the text is the same object each time.
+nb::object attribute(nb::handle object, const char* name) {
+  static std::unordered_map<const char*, PyObject*> known;
+  PyObject*& text = known[name];
+  if (text == nullptr) text = PyUnicode_InternFromString(name);
+  PyObject* const found = text == nullptr ? nullptr : PyObject_GetAttr(object.ptr(), text);
+  if (found == nullptr) throw nb::python_error();
+  return nb::steal(found);
+}
 
 /// NumPy's function `empty`, looked up once.
 nb::handle empty() {
@@ -78,8 +90,8 @@ Tuple arrays_of(const Matrix& a) {
 
 /// Indices of 32 bits: those of SciPy are longer if it made them so.
 nb::object indices_of(nb::handle matrix, const char* name) {
-  nb::object indices = matrix.attr(name);
-  if (nb::cast<int>(indices.attr("itemsize")) == 4) return indices;
+  nb::object indices = attribute(matrix, name);
+  if (nb::cast<int>(attribute(indices, "itemsize")) == 4) return indices;
   return indices.attr("astype")("int32");
 }
 
@@ -100,7 +112,7 @@ bool are_below(std::span<const Number> numbers, std::size_t bound) {
 class Given {
  public:
   Given(nb::handle matrix, std::size_t rows, const char* what)
-      : data_(matrix.attr("data"), what),
+      : data_(attribute(matrix, "data"), what),
         index_(indices_of(matrix, "indices"), what),
         pointer_(indices_of(matrix, "indptr"), what),
         rows_(static_cast<Index>(rows)) {
@@ -140,7 +152,7 @@ stepping::Table<Number> table_of(const Buffer<const Number>& buffer) {
 Tuple active_contacts(nb::handle H, nb::handle M, nb::handle v, nb::handle force, nb::handle pair,
                       nb::handle point, nb::handle gap, int d, double h, bool allowance,
                       double rounding, double motion, nb::handle surface, double activation,
-                      int face) {
+                      int face, double restitution) {
   const Doubles speeds(v, "v"), forces(force, "force"), points(point, "point"), gaps(gap, "gap");
   const Integers pairs(pair, "pair");
   const Given by_contacts(H, speeds.rows(), "H"), mass(M, speeds.rows(), "M");
@@ -180,6 +192,7 @@ Tuple active_contacts(nb::handle H, nb::handle M, nb::handle v, nb::handle force
     for (const auto place : own) closed.push_back(found.closed[static_cast<std::size_t>(place)]);
     crowded.append(nb::make_tuple(array_of(own), array_of(closed)));
   }
+  for (double& speed : found.before) speed *= restitution;
   return Tuple(nb::make_tuple(array_of(found.which), array_of(found.before), crowded));
 }
 
@@ -203,11 +216,12 @@ P problem_of(stepping::Equations&& equations, int d, const ProblemInfo& info) {
 }
 
 Tuple step_problem(int d, double h, double theta, nb::handle M, nb::handle C, nb::handle K,
-                   nb::handle H, nb::handle G, nb::handle force, nb::handle v, nb::handle b,
-                   nb::handle w, nb::handle active, nb::handle tree, nb::handle dry,
+                   nb::handle H, nb::handle G, nb::handle force, nb::handle v, nb::handle violation,
+                   double undone, nb::handle w, nb::handle active, nb::handle tree, nb::handle dry,
                    nb::handle driven, bool all_bodies, nb::handle mu, nb::handle mu_r,
                    nb::handle mu_s, const ProblemInfo& info) {
-  const Doubles forces(force, "force"), speeds(v, "v"), sides(b, "b"), normals(w, "w");
+  const Doubles forces(force, "force"), speeds(v, "v"), violations(violation, "violation"),
+      normals(w, "w");
   const Integers trees(tree, "tree");
   const std::size_t n = speeds.rows();
   const Given mass(M, n, "M"), damping(C, n, "C"), stiffness(K, n, "K"), contacts(H, n, "H"),
@@ -223,7 +237,9 @@ Tuple step_problem(int d, double h, double theta, nb::handle M, nb::handle C, nb
   system.G = joints;
   system.force = forces.all();
   system.v = speeds.all();
-  system.b = sides.all();
+  std::vector<double> sides(violations.all().begin(), violations.all().end());
+  for (double& side : sides) side *= undone;
+  system.b = sides;
   system.w = normals.all();
   system.tree = trees.all();
   system.all_bodies = all_bodies;
@@ -233,14 +249,14 @@ Tuple step_problem(int d, double h, double theta, nb::handle M, nb::handle C, nb
   if (!active.is_none()) system.active = chosen.emplace(active, "active").all();
   if (!dry.is_none()) {
     auto& own = system.dry.emplace();
-    own.gradient = gradient.emplace(dry.attr("gradient"), n, "gradient");
-    own.bound = bound.emplace(dry.attr("bound"), "bound").all();
-    own.mass = inertia.emplace(dry.attr("mass"), "mass").all();
+    own.gradient = gradient.emplace(attribute(dry, "gradient"), n, "gradient");
+    own.bound = bound.emplace(attribute(dry, "bound"), "bound").all();
+    own.mass = inertia.emplace(attribute(dry, "mass"), "mass").all();
   }
   if (!driven.is_none()) {
     auto& own = system.driven.emplace();
-    own.dof = given.emplace(driven.attr("dof"), "dof").all();
-    own.velocity = velocity.emplace(driven.attr("velocity"), "velocity").all();
+    own.dof = given.emplace(attribute(driven, "dof"), "dof").all();
+    own.velocity = velocity.emplace(attribute(driven, "velocity"), "velocity").all();
   }
   const std::size_t nc = contacts.columns() / static_cast<std::size_t>(d);
   const std::size_t more = system.dry ? system.dry->bound.size() : 0;
@@ -305,13 +321,13 @@ Tuple contact_table(nb::handle data, nb::handle contact, nb::handle length, nb::
                     nb::handle value, int n, bool spin, bool rolling, double least) {
   const Small lengths(length, "length"), columns(column, "column");
   const Doubles values(value, "value");
-  const Small address(contact.attr("efc_address"), "efc_address"),
-      shape(contact.attr("geom"), "geom"), dim(contact.attr("dim"), "dim"),
-      kind(data.attr("efc_type"), "efc_type"), number(data.attr("efc_id"), "efc_id");
-  const Doubles friction(contact.attr("friction"), "friction"), gap(contact.attr("dist"), "dist"),
-      point(contact.attr("pos"), "pos"), frame(contact.attr("frame"), "frame"),
-      position(data.attr("efc_pos"), "efc_pos");
-  const auto count = [&](const char* name) { return nb::cast<std::size_t>(data.attr(name)); };
+  const Small address(attribute(contact, "efc_address"), "efc_address"),
+      shape(attribute(contact, "geom"), "geom"), dim(attribute(contact, "dim"), "dim"),
+      kind(attribute(data, "efc_type"), "efc_type"), number(attribute(data, "efc_id"), "efc_id");
+  const Doubles friction(attribute(contact, "friction"), "friction"),
+      gap(attribute(contact, "dist"), "dist"), point(attribute(contact, "pos"), "pos"),
+      frame(attribute(contact, "frame"), "frame"), position(attribute(data, "efc_pos"), "efc_pos");
+  const auto count = [&](const char* name) { return nb::cast<std::size_t>(attribute(data, name)); };
   stepping::ContactTable made = stepping::contacts_of(
       {n, lengths.all(), columns.all(), values.all()},
       {address.rows(), table_of(address), table_of(shape), table_of(dim), table_of(friction),
@@ -322,6 +338,26 @@ Tuple contact_table(nb::handle data, nb::handle contact, nb::handle length, nb::
                               array_of(made.frame, 3, 3), array_of(made.gap), array_of(made.mu),
                               rolling ? array_of(made.mu_r) : nb::none(),
                               spin ? array_of(made.mu_s) : nb::none()));
+}
+
+nb::object set_margins(nb::handle model, nb::handle speed, double h, double fall, nb::handle slack,
+                       nb::handle own, nb::handle owner, nb::handle first) {
+  const Doubles speeds(speed, "speed"), slacks(slack, "slack"), margins(own, "own");
+  const Integers owners(owner, "owner"), firsts(first, "first");
+  const Buffer<double> geometries(attribute(model, "geom_margin"), "geom_margin"),
+      bodies(attribute(model, "body_margin"), "body_margin");
+  const std::size_t count = geometries.rows();
+  require(speeds.rows() == count && slacks.rows() == count && margins.rows() == count, "speed");
+  require(owners.rows() == firsts.rows() && are_below(owners.all(), bodies.rows()) &&
+              are_below(firsts.all(), count),
+          "owner");
+  std::vector<double> reach(count);
+  for (std::size_t g = 0; g < count; ++g) {
+    reach[g] = h * speeds.data()[g] + fall + slacks.data()[g];
+  }
+  stepping::set_margins(margins.all(), reach, owners.all(), firsts.all(),
+                        {geometries.all(), bodies.all()});
+  return array_of(reach);
 }
 
 /// Some rows of an array, or all, and `more` rows of another one, or zeros.
@@ -373,7 +409,7 @@ nb::list rows_of(const nb::tuple& arrays, nb::handle which, nb::handle others) {
       continue;
     }
     const nb::object other = others.is_none() ? nb::none() : nb::object(others[k]);
-    const nb::object type = array.attr("dtype");
+    const nb::object type = attribute(array, "dtype");
     if (type.is(dtype<double>())) {
       found.append(rows_of_one<double>(array, chosen, other, more));
     } else if (type.is(dtype<std::int64_t>())) {
@@ -401,18 +437,18 @@ const GlobalProblem& global(nb::handle object) {
 class GivenServos {
  public:
   GivenServos(nb::handle servos, nb::handle data)
-      : start_(data.attr("moment_rowadr"), "moment_rowadr"),
-        length_(data.attr("moment_rownnz"), "moment_rownnz"),
-        column_(data.attr("moment_colind"), "moment_colind"),
-        moment_(data.attr("actuator_moment"), "actuator_moment"),
-        stiffness_(servos.attr("stiffness"), "stiffness"),
-        damping_(servos.attr("damping"), "damping"),
-        low_(servos.attr("low"), "low"),
-        high_(servos.attr("high"), "high"),
-        joint_low_(servos.attr("joint_low"), "joint_low"),
-        joint_high_(servos.attr("joint_high"), "joint_high"),
-        springs_(servos.attr("springs"), "springs"),
-        dampers_(servos.attr("dampers"), "dampers") {
+      : start_(attribute(data, "moment_rowadr"), "moment_rowadr"),
+        length_(attribute(data, "moment_rownnz"), "moment_rownnz"),
+        column_(attribute(data, "moment_colind"), "moment_colind"),
+        moment_(attribute(data, "actuator_moment"), "actuator_moment"),
+        stiffness_(attribute(servos, "stiffness"), "stiffness"),
+        damping_(attribute(servos, "damping"), "damping"),
+        low_(attribute(servos, "low"), "low"),
+        high_(attribute(servos, "high"), "high"),
+        joint_low_(attribute(servos, "joint_low"), "joint_low"),
+        joint_high_(attribute(servos, "joint_high"), "joint_high"),
+        springs_(attribute(servos, "springs"), "springs"),
+        dampers_(attribute(servos, "dampers"), "dampers") {
     moments = {start_.all(), length_.all(), column_.all(), moment_.all()};
     all.stiffness = stiffness_.all();
     all.damping = damping_.all();
@@ -422,7 +458,7 @@ class GivenServos {
     all.joint_high = joint_high_.all();
     all.springs = springs_.all();
     all.dampers = dampers_.all();
-    for (const nb::handle tendon : servos.attr("tendons")) {
+    for (const nb::handle tendon : attribute(servos, "tendons")) {
       const Integers outputs(tendon[0], "tendons");
       auto& own = all.tendons.emplace_back();
       own.outputs.assign(outputs.all().begin(), outputs.all().end());
@@ -446,16 +482,18 @@ void bind_stepping(nb::module_& m) {
   m.def(
       "active_contacts", &active_contacts, "H"_a, "M"_a, "v"_a, "force"_a, "pair"_a, "point"_a,
       "gap"_a, "d"_a, "h"_a, "allowance"_a, "rounding"_a, "motion"_a, "surface"_a.none(),
-      "activation"_a, "face"_a,
-      "The active contacts of a step by the velocity law, their normal velocities before it, and\n"
-      "for each pair of more than `face` points: their places among the active ones, and their\n"
-      "gaps that count as closed.");
-  m.def(
-      "step_problem", &step_problem, "d"_a, "h"_a, "theta"_a, "M"_a, "C"_a, "K"_a, "H"_a, "G"_a,
-      "force"_a, "v"_a, "b"_a, "w"_a, "active"_a.none(), "tree"_a, "dry"_a.none(),
-      "driven"_a.none(), "all_bodies"_a, "mu"_a, "mu_r"_a.none(), "mu_s"_a.none(), "info"_a,
-      "The problem of a step; its degrees of freedom in the system (None: all); the contacts that\n"
-      "it has (None: all); and M, G, f, b and degrees of freedom of what moves freely (or None).");
+      "activation"_a, "face"_a, "restitution"_a,
+      "The active contacts of a step by the velocity law, their normal velocities before it times\n"
+      "the restitution, and for each pair of more than `face` points: their places among the\n"
+      "active ones, and their gaps that count as closed.");
+  m.def("step_problem", &step_problem, "d"_a, "h"_a, "theta"_a, "M"_a, "C"_a, "K"_a, "H"_a, "G"_a,
+        "force"_a, "v"_a, "violation"_a, "undone"_a, "w"_a, "active"_a.none(), "tree"_a,
+        "dry"_a.none(), "driven"_a.none(), "all_bodies"_a, "mu"_a, "mu_r"_a.none(), "mu_s"_a.none(),
+        "info"_a,
+        "The problem of a step, with b of so many times the violation; its degrees of freedom in "
+        "the\n"
+        "system (None: all); the contacts that it has (None: all); and M, G, f, b and degrees of\n"
+        "freedom of what moves freely (or None).");
   m.def("contact_table", &contact_table, "data"_a, "contact"_a, "length"_a, "column"_a, "value"_a,
         "n"_a, "spin"_a, "rolling"_a, "least"_a,
         "H, pair, point, frame, gap, mu, mu_r and mu_s of MuJoCo's contacts and limits, from the\n"
@@ -476,6 +514,32 @@ void bind_stepping(nb::module_& m) {
       nb::sig("def speeds_of(twist: object, body: object, centre: object, root: object, place: "
               "object, radius: object) -> numpy.typing.NDArray[numpy.float64]"),
       "The speed of each geometry that none of its points exceeds.");
+  m.def(
+      "set_margins", &set_margins, "model"_a, "speed"_a, "h"_a, "fall"_a, "slack"_a, "own"_a,
+      "owner"_a, "first"_a,
+      nb::sig("def set_margins(model: object, speed: object, h: float, fall: float, slack: object, "
+              "own: object, owner: object, first: object) -> numpy.typing.NDArray[numpy.float64]"),
+      "Sets the margins of geometries, and of the bodies that own them, to their reach within h,\n"
+      "or to their own margins if these are larger. The reach, which is returned, is what their\n"
+      "speeds move, `fall` [m] and the slack.");
+  m.def(
+      "other_forces",
+      [](nb::handle data) {
+        const Doubles passive(attribute(data, "qfrc_passive"), "qfrc_passive"),
+            applied(attribute(data, "qfrc_applied"), "qfrc_applied"),
+            bias(attribute(data, "qfrc_bias"), "qfrc_bias"),
+            pushes(attribute(data, "xfrc_applied"), "xfrc_applied");
+        require(applied.rows() == passive.rows() && bias.rows() == passive.rows(), "force");
+        std::vector<double> force(passive.rows());
+        for (std::size_t k = 0; k < force.size(); ++k) {
+          force[k] = passive.data()[k] + applied.data()[k] - bias.data()[k];
+        }
+        const auto all = pushes.all();
+        const bool pushed = std::any_of(all.begin(), all.end(), [](double x) { return x != 0; });
+        return Tuple(nb::make_tuple(array_of(force), pushed));
+      },
+      "data"_a,
+      "MuJoCo's passive and applied forces minus its bias, and whether bodies are pushed besides.");
   m.def(
       "not_between",
       [](nb::handle points, nb::handle off) {
@@ -540,6 +604,34 @@ void bind_stepping(nb::module_& m) {
       nb::sig("def places_on_shapes(point: object, pair: object, place: object, turn: object, x: "
               "float, y: float) -> numpy.typing.NDArray[numpy.float64]"),
       "Points (nc x 3) in the frames of their two shapes (nc x 2 x 3); 0 for limits.");
+  m.def(
+      "are_within",
+      [](nb::handle values, double bound) {
+        const Doubles own(values, "values");
+        const auto all = own.all();
+        return std::all_of(all.begin(), all.end(),
+                           [bound](double value) { return std::abs(value) < bound; });
+      },
+      "values"_a, "bound"_a, nb::sig("def are_within(values: object, bound: float) -> bool"),
+      "Whether all numbers are finite and of a size below a bound.");
+  m.def(
+      "chosen_entries",
+      [](nb::handle values, nb::handle entry, nb::handle row, nb::handle pointer) {
+        const Doubles all(values, "values");
+        const Integers entries(entry, "entry");
+        const Small rows(row, "row"), pointers(pointer, "pointer");
+        const auto starts = pointers.all();
+        require(are_below(entries.all(), all.rows()), "entry");
+        require(rows.rows() == entries.rows() && !starts.empty() && starts.front() == 0 &&
+                    std::is_sorted(starts.begin(), starts.end()) &&
+                    static_cast<std::size_t>(starts.back()) == entries.rows() &&
+                    are_below(rows.all(), starts.size() - 1),
+                "row");
+        return arrays_of(stepping::chosen_entries(all.all(), entries.all(), rows.all(), starts,
+                                                  static_cast<Index>(starts.size()) - 1));
+      },
+      "values"_a, "entry"_a, "row"_a, "pointer"_a,
+      "A square matrix by columns of some of the values, without those that are 0.");
   m.def("rows_of", &rows_of, "arrays"_a, "which"_a.none(), "others"_a.none(),
         nb::sig("def rows_of(arrays: tuple[object, ...], which: object, others: tuple[object, ...] "
                 "| None) -> list[typing.Any]"),
@@ -547,9 +639,9 @@ void bind_stepping(nb::module_& m) {
   m.def(
       "bilateral_rows",
       [](nb::handle data, int n, nb::handle group, nb::handle rounding, double rank) {
-        const Small lengths(data.attr("efc_J_rownnz"), "length"),
-            columns(data.attr("efc_J_colind"), "column");
-        const Doubles values(data.attr("efc_J"), "value"), blurs(rounding, "rounding");
+        const Small lengths(attribute(data, "efc_J_rownnz"), "length"),
+            columns(attribute(data, "efc_J_colind"), "column");
+        const Doubles values(attribute(data, "efc_J"), "value"), blurs(rounding, "rounding");
         const Integers groups(group, "group");
         const stepping::Rows rows{n, lengths.all(), columns.all(), values.all()};
         const auto kept = stepping::rows_that_count(rows, groups.all(), blurs.all(), rank);
@@ -597,9 +689,9 @@ void bind_stepping(nb::module_& m) {
       "servo_forces",
       [](nb::handle servos, nb::handle data, double h, nb::handle M, nb::handle other) {
         const GivenServos given(servos, data);
-        const Doubles raw(data.attr("actuator_force"), "actuator_force"),
-            whole(data.attr("qfrc_actuator"), "qfrc_actuator"), v(data.attr("qvel"), "qvel"),
-            forces(other, "other");
+        const Doubles raw(attribute(data, "actuator_force"), "actuator_force"),
+            whole(attribute(data, "qfrc_actuator"), "qfrc_actuator"),
+            v(attribute(data, "qvel"), "qvel"), forces(other, "other");
         const Given mass(M, v.rows(), "M");
         const stepping::Limited made = stepping::within_limits(
             given.all, given.moments, raw.all(), whole.all(), mass, forces.all(), v.all(), h);

@@ -3,6 +3,8 @@
 //   W = H^T M^-1 H,   q = H^T M^-1 f + w,   V = H^T M^-1 G,   R = G^T M^-1 G,   s = G^T M^-1 f + b
 #pragma once
 
+#include <utility>
+
 #include "deadline.hpp"
 #include "linalg/factorization.hpp"
 #include "problem.hpp"
@@ -25,6 +27,8 @@ class Condensation {
 
   [[nodiscard]] const LocalProblem& local() const { return local_; }
   [[nodiscard]] const Factorization& mass() const { return mass_; }
+  /// Takes the factorisation out. What needs it cannot be called any more.
+  [[nodiscard]] Factorization take_mass() { return std::move(mass_); }
   /// `expanded` with the factorisation that is kept.
   [[nodiscard]] Solution expand(const Solution& local) const;
 

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -120,19 +121,87 @@ class Bits {
   std::vector<std::uint64_t> found_;
 };
 
-/// A^T A. Each sum is computed once: column by column the part on and below the diagonal, then its
-/// mirror image. Nothing if the deadline passes.
-std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& deadline) {
-  const SparseColumns rows = a.transpose();
+/// An entry of A^T A: the sum of the products of two columns, row after row.
+double product(const SparseColumns& a, Index one, Index other) {
+  double sum = -0.0;  // adding to it changes nothing, not even a signed zero
+  SparseColumns::InnerIterator left(a, one), right(a, other);
+  while (left && right) {
+    if (left.row() == right.row()) sum += left.value() * right.value();
+    const bool both = left.row() == right.row(), first = left.row() < right.row();
+    if (both || first) ++left;
+    if (both || !first) ++right;
+  }
+  return sum;
+}
+
+/// The lower triangle of A^T A, by some columns at once: the sums of a row of A lie side by side.
+/// `rows` is A^T.
+std::optional<SparseColumns> square_of_dense_rows(const SparseColumns& a, const SparseColumns& rows,
+                                                  const Deadline& deadline) {
+  constexpr Index lanes = 4;
   const auto m = static_cast<Index>(a.cols());
-  // the entries of a row of A from the present column on
+  // the entries of a row of A from the present columns on
   std::vector<Index> next(rows.outerIndexPtr(), rows.outerIndexPtr() + rows.cols());
-  std::vector<double> sum(m, -0.0);  // adding it changes nothing, not even a signed zero
+  std::vector<double> sum(static_cast<std::size_t>(lanes) * static_cast<std::size_t>(m), 0.0);
+  Bits bits(a, m);
+  SparseColumns lower(m, m);
+  lower.reserve(rows.nonZeros());
+  for (Index start = 0; start < m; start += lanes) {
+    if (start % columns_at_once == 0 && deadline.passed()) return std::nullopt;
+    const Index count = std::min(lanes, m - start);
+    std::array<Index, lanes> at{};
+    std::copy_n(a.outerIndexPtr() + start, count, at.begin());
+    while (true) {
+      auto k = static_cast<Index>(a.rows());
+      for (Index lane = 0; lane < count; ++lane) {
+        if (at[lane] < a.outerIndexPtr()[start + lane + 1]) {
+          k = std::min(k, a.innerIndexPtr()[at[lane]]);
+        }
+      }
+      if (k == static_cast<Index>(a.rows())) break;
+      const Index first = next[k];
+      std::array<double, lanes> value{};
+      for (Index lane = 0; lane < count; ++lane) {
+        if (at[lane] == a.outerIndexPtr()[start + lane + 1]) continue;
+        if (a.innerIndexPtr()[at[lane]] != k) continue;
+        value[lane] = a.valuePtr()[at[lane]++];
+        ++next[k];
+      }
+      for (Index entry = first; entry < rows.outerIndexPtr()[k + 1]; ++entry) {
+        double* const to = &sum[static_cast<std::size_t>(lanes * rows.innerIndexPtr()[entry])];
+        for (Index lane = 0; lane < lanes; ++lane) {
+          to[lane] += rows.valuePtr()[entry] * value[lane];
+        }
+      }
+    }
+    for (Index lane = 0; lane < count; ++lane) {
+      const Index col = start + lane;
+      for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+        bits.add(static_cast<Index>(entry.row()), col);
+      }
+      lower.startVec(col);
+      bits.take(col, [&](Index row) {
+        const double found = sum[static_cast<std::size_t>(lanes * row + lane)];
+        // zeros of other columns change signs of zeros, and make NaN of infinities
+        const bool plain = found != 0 && std::isfinite(found);
+        lower.insertBack(row, col) = plain ? found : product(a, row, col);
+      });
+    }
+    std::fill(sum.begin() + static_cast<std::ptrdiff_t>(lanes * start), sum.end(), 0.0);
+  }
+  lower.finalize();
+  return lower;
+}
+
+/// The same, if rows are sparse.
+std::optional<SparseColumns> square_of_sparse_rows(const SparseColumns& a,
+                                                   const SparseColumns& rows,
+                                                   const Deadline& deadline) {
+  const auto m = static_cast<Index>(a.cols());
+  std::vector<Index> next(rows.outerIndexPtr(), rows.outerIndexPtr() + rows.cols());
+  std::vector<double> sum(m, -0.0);
   std::vector<Index> last(m, -1);
   std::vector<Index> found;
-  // if rows are dense, words take less than entries
-  std::optional<Bits> bits;
-  if (a.rows() * (m / 64 + 1) <= a.nonZeros()) bits.emplace(a, m);
   SparseColumns lower(m, m);
   lower.reserve(rows.nonZeros());
   for (Index col = 0; col < m; ++col) {
@@ -140,45 +209,56 @@ std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& dead
     found.clear();
     for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
       const auto k = static_cast<std::size_t>(entry.row());
-      const Index first = next[k]++;
-      const Index* row = rows.innerIndexPtr() + first;
-      const double* value = rows.valuePtr() + first;
-      const Index count = rows.outerIndexPtr()[k + 1] - first;
-      if (bits) {
-        bits->add(static_cast<Index>(k), col);
-        if (row[count - 1] - row[0] == count - 1) {  // without gaps
-          Eigen::Map<Vector>(&sum[row[0]], count) +=
-              entry.value() * Eigen::Map<const Vector>(value, count);
-        } else {
-          for (Index at = 0; at < count; ++at) sum[row[at]] += value[at] * entry.value();
-        }
-        continue;
-      }
-      for (Index at = 0; at < count; ++at) {
-        sum[row[at]] += value[at] * entry.value();
-        if (last[row[at]] != col) {
-          last[row[at]] = col;
-          found.push_back(row[at]);
+      for (Index at = next[k]++; at < rows.outerIndexPtr()[k + 1]; ++at) {
+        const Index row = rows.innerIndexPtr()[at];
+        sum[row] += rows.valuePtr()[at] * entry.value();
+        if (last[row] != col) {
+          last[row] = col;
+          found.push_back(row);
         }
       }
     }
     lower.startVec(col);
-    const auto keep = [&](Index row) {
+    std::sort(found.begin(), found.end());
+    for (const Index row : found) {
       lower.insertBack(row, col) = sum[row];
       sum[row] = -0.0;
-    };
-    if (bits) {
-      bits->take(col, keep);
-    } else {
-      std::sort(found.begin(), found.end());
-      std::for_each(found.begin(), found.end(), keep);
     }
   }
   lower.finalize();
-  return mirrored(lower);
+  return lower;
+}
+
+/// A^T A. Each sum is computed once: the part on and below the diagonal, then its mirror image.
+/// Nothing if the deadline passes.
+std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& deadline) {
+  const SparseColumns rows = a.transpose();
+  // words of bits take less than entries if rows are dense
+  const bool dense = a.rows() * (a.cols() / 64 + 1) <= a.nonZeros();
+  const std::optional<SparseColumns> lower =
+      dense ? square_of_dense_rows(a, rows, deadline) : square_of_sparse_rows(a, rows, deadline);
+  if (!lower) return std::nullopt;
+  return mirrored(*lower);
+}
+
+/// Whether a matrix and its transpose have the same entries, in the same order.
+bool is_its_transpose(const SparseColumns& a) {
+  const Index* const first = a.outerIndexPtr();
+  std::vector<Index> next(first, first + a.cols());
+  for (Index col = 0; col < static_cast<Index>(a.cols()); ++col) {
+    for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+      const Index at = next[static_cast<std::size_t>(entry.row())]++;
+      if (at >= first[entry.row() + 1] || a.innerIndexPtr()[at] != col ||
+          a.valuePtr()[at] != entry.value()) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 bool is_symmetric(const SparseColumns& a) {
+  if (a.isCompressed() && is_its_transpose(a)) return true;
   const SparseColumns transposed = a.transpose();
   const SparseColumns difference = a - transposed;
   double largest = 0;
@@ -197,6 +277,45 @@ bool is_symmetric(const SparseColumns& a) {
 struct Factorization::Cholesky
     : Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<Index>> {
   using SimplicialLLT::SimplicialLLT;
+
+  [[nodiscard]] const SparseColumns& lower() const { return matrixL().nestedExpression(); }
+
+  /// The rows that L^-1 P b may reach, from those of b: paths in the elimination tree (Gilbert &
+  /// Peierls).
+  class Reach {
+   public:
+    explicit Reach(const Cholesky& factors)
+        : parent_(factors.m_parent),
+          place_(factors.permutationP().indices()),
+          visited_(static_cast<std::size_t>(parent_.size()), false) {}
+
+    /// Adds those from a row of b, whose place in P b is returned.
+    Index add(Eigen::Index row) {
+      const Index place = place_[row];
+      for (Index node = place; node >= 0 && !visited_[node]; node = parent_[node]) {
+        visited_[node] = true;
+        rows_.push_back(node);
+      }
+      return place;
+    }
+
+    /// Visits them in their order, and forgets them.
+    template <class Visitor>
+    void take(const Visitor& visit) {
+      std::sort(rows_.begin(), rows_.end());
+      for (const Index node : rows_) {
+        visit(node);
+        visited_[node] = false;
+      }
+      rows_.clear();
+    }
+
+   private:
+    const VectorI& parent_;
+    const Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index>::IndicesType& place_;
+    std::vector<char> visited_;
+    std::vector<Index> rows_;
+  };
 };
 struct Factorization::LU : Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>> {};
 
@@ -347,7 +466,7 @@ Vector Factorization::solve(ConstVectorRef b) const {
 Vector Factorization::terms(ConstVectorRef x) const {
   if (supernodal_) return supernodal_->terms(x);
   if (!cholesky_) return Vector::Zero(x.size());
-  const SparseColumns& lower = cholesky_->matrixL().nestedExpression();
+  const SparseColumns& lower = cholesky_->lower();
   const Vector permuted = cholesky_->permutationP() * x;
   Vector sizes = Vector::Zero(x.size());
   for (Eigen::Index col = 0; col < lower.cols(); ++col) {
@@ -389,11 +508,43 @@ std::optional<SparseColumns> Factorization::gram(const SparseColumns& b,
 
 Vector Factorization::gram_diagonal(const SparseColumns& b) const {
   if (supernodal_) return supernodal_->gram_diagonal(b);
-  const bool whole = lu_ || blocks_;
-  const SparseColumns x = whole ? solve(b) : *half_solve(b, never);
   Vector result(b.cols());
-  for (Eigen::Index col = 0; col < b.cols(); ++col) {
-    result[col] = whole ? b.col(col).dot(x.col(col)) : x.col(col).squaredNorm();
+  if (!cholesky_) {
+    const SparseColumns x = solve(b);
+    for (Eigen::Index col = 0; col < b.cols(); ++col) result[col] = b.col(col).dot(x.col(col));
+    return result;
+  }
+  // some columns at once, as those of a contact reach the same rows: their L^-1 P b, row by row
+  constexpr Eigen::Index lanes = 4;
+  const SparseColumns& lower = cholesky_->lower();
+  Cholesky::Reach reach(*cholesky_);
+  std::vector<double> work(static_cast<std::size_t>(lanes * lower.rows()), 0.0);
+  for (Eigen::Index first = 0; first < b.cols(); first += lanes) {
+    const Eigen::Index count = std::min(lanes, b.cols() - first);
+    for (Eigen::Index lane = 0; lane < count; ++lane) {
+      for (SparseColumns::InnerIterator entry(b, first + lane); entry; ++entry) {
+        work[static_cast<std::size_t>(lanes * reach.add(entry.row()) + lane)] = entry.value();
+      }
+    }
+    std::array<double, lanes> sum{};
+    reach.take([&](Index node) {
+      const Index own = lower.outerIndexPtr()[node];  // the diagonal comes first
+      const Index past = lower.outerIndexPtr()[node + 1];
+      double* const at = &work[static_cast<std::size_t>(lanes * node)];
+      std::array<double, lanes> value;
+      for (Eigen::Index lane = 0; lane < lanes; ++lane) {
+        value[lane] = at[lane] / lower.valuePtr()[own];
+        sum[lane] += value[lane] * value[lane];
+        at[lane] = 0;
+      }
+      for (Index k = own + 1; k < past; ++k) {
+        double* const below = &work[static_cast<std::size_t>(lanes * lower.innerIndexPtr()[k])];
+        for (Eigen::Index lane = 0; lane < lanes; ++lane) {
+          below[lane] -= lower.valuePtr()[k] * value[lane];
+        }
+      }
+    });
+    for (Eigen::Index lane = 0; lane < count; ++lane) result[first + lane] = sum[lane];
   }
   return result;
 }
@@ -406,48 +557,24 @@ std::optional<SparseColumns> Factorization::half(const SparseColumns& b) const {
 std::optional<SparseColumns> Factorization::half_solve(const SparseColumns& b,
                                                        const Deadline& deadline) const {
   if (!cholesky_) return b;
-  const SparseColumns& lower = cholesky_->matrixL().nestedExpression();
-  const SparseColumns permuted = cholesky_->permutationP() * b;
-  const auto n = static_cast<std::size_t>(lower.rows());
-
-  // parent in the elimination tree: the first entry below the diagonal of each column of L
-  std::vector<Index> parent(n, -1);
-  for (std::size_t col = 0; col < n; ++col) {
-    for (SparseColumns::InnerIterator entry(lower, static_cast<Eigen::Index>(col)); entry;
-         ++entry) {
-      const auto row = static_cast<Index>(entry.row());
-      if (row > static_cast<Index>(col) && (parent[col] < 0 || row < parent[col]))
-        parent[col] = row;
-    }
-  }
-
-  // each column: its pattern is what the tree reaches from that of the right-hand side (Gilbert &
-  // Peierls)
-  std::vector<double> work(n, 0.0);
-  std::vector<Index> visited(n, -1);
-  std::vector<Index> reach;
+  const SparseColumns& lower = cholesky_->lower();
+  Cholesky::Reach reach(*cholesky_);
+  std::vector<double> work(static_cast<std::size_t>(lower.rows()), 0.0);
   SparseColumns result(b.rows(), b.cols());
-  result.reserve(permuted.nonZeros());
+  result.reserve(b.nonZeros());
   for (Index col = 0; col < static_cast<Index>(b.cols()); ++col) {
     if (col % columns_at_once == 0 && deadline.passed()) return std::nullopt;
-    reach.clear();
-    for (SparseColumns::InnerIterator entry(permuted, col); entry; ++entry) {
-      work[static_cast<std::size_t>(entry.row())] = entry.value();
-      for (auto node = static_cast<Index>(entry.row()); node >= 0 && visited[node] != col;
-           node = parent[node]) {
-        visited[node] = col;
-        reach.push_back(node);
-      }
+    for (SparseColumns::InnerIterator entry(b, col); entry; ++entry) {
+      work[static_cast<std::size_t>(reach.add(entry.row()))] = entry.value();
     }
-    std::sort(reach.begin(), reach.end());
     result.startVec(col);
-    for (const Index node : reach) {
+    reach.take([&](Index node) {
       SparseColumns::InnerIterator entry(lower, node);  // the diagonal comes first
       const double value = work[node] / entry.value();
       for (++entry; entry; ++entry) work[entry.row()] -= entry.value() * value;
       result.insertBack(node, col) = value;
       work[node] = 0;
-    }
+    });
   }
   result.finalize();
   return result;

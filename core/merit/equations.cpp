@@ -28,12 +28,25 @@ RealVector product(const Matrix& a, const X& x) {
   return y;
 }
 
+/// The sums of term(row, value) over the entries of each column of A.
+template <class Term>
+RealVector sums_of_columns(const Matrix& a, const Term& term) {
+  RealVector y = RealVector::Zero(a.cols);
+  if (a.storage == Storage::csc) {  // a sum that stays in the processor takes half the time
+    for (Index col = 0; col < a.cols; ++col) {
+      Real sum = 0;
+      for (Index k = a.p[col]; k < a.p[col + 1]; ++k) sum += term(a.i[k], a.x[k]);
+      y[col] = sum;
+    }
+  } else {
+    for_each_entry(a, [&](Index row, Index col, double value) { y[col] += term(row, value); });
+  }
+  return y;
+}
+
 template <class X>
 RealVector product_transposed(const Matrix& a, const X& x) {
-  RealVector y = RealVector::Zero(a.cols);
-  for_each_entry(
-      a, [&](Index row, Index col, double value) { y[col] += full_product(value, x[row]); });
-  return y;
+  return sums_of_columns(a, [&](Index row, double value) { return full_product(value, x[row]); });
 }
 
 /// |A| |x|: the sizes of the terms that the product adds up.
@@ -49,11 +62,8 @@ RealVector sizes(const Matrix& a, const X& x) {
 /// |A|^T |x|
 template <class X>
 RealVector sizes_transposed(const Matrix& a, const X& x) {
-  RealVector y = RealVector::Zero(a.cols);
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    y[col] += full_product(abs(value), abs(x[row]));
-  });
-  return y;
+  return sums_of_columns(
+      a, [&](Index row, double value) { return full_product(abs(value), abs(x[row])); });
 }
 
 RealVector solved(const Factorization& mass, const RealVector& b) {

@@ -55,12 +55,19 @@ std::string too_coarse(double digit) {
   return text;
 }
 
+/// What a second solve of the same problem need not find again.
+struct Kept {
+  std::optional<Factorization> mass;
+  std::optional<OwnSizes> own;
+};
+
 struct Request {
   const Solver& solver;
   const Settings& settings;
   const OptionValues& options;
   const Deadline& deadline;  ///< of the whole solve, conversions included
   Stopwatch& watch;          ///< of the whole solve, conversions included
+  Kept& kept;
 };
 
 /// What the merit is relative to.
@@ -97,6 +104,15 @@ struct Measure {
 /// For each contact, whether its reaction moves anything.
 std::vector<bool> moving(const Matrix& W, int d) {
   std::vector<bool> moves(static_cast<std::size_t>(W.cols / d), false);
+  if (W.storage == Storage::csc) {  // one entry is enough
+    for (Index col = 0; col < W.cols; ++col) {
+      const auto contact = static_cast<std::size_t>(col / d);
+      for (Index k = W.p[col]; k < W.p[col + 1] && !moves[contact]; ++k) {
+        moves[contact] = W.x[k] != 0;
+      }
+    }
+    return moves;
+  }
   for_each_entry(W, [&](Index, Index col, double value) {
     if (value != 0) moves[static_cast<std::size_t>(col / d)] = true;
   });
@@ -446,7 +462,7 @@ std::optional<Result> known_solution(const P& problem, const Friction& friction,
   multiply_transposed_add(problem.H, mass.solve(problem.f), q);
   const double error = std::sqrt(natural_squares(d, friction, solution.u, solution.r));
   if (!(error <= settings.tolerance * q.stableNorm())) return {};
-  const OwnSizes own = own_sizes(problem, mass);
+  const OwnSizes own = request.kept.own ? *request.kept.own : own_sizes(problem, mass);
   // if only rounding is left of q, the solution is r = 0
   if (!(q.stableNorm() > static_cast<double>(own.rounding.norm()))) return {};
   result.error = judge_and_complete(problem, friction, mass, own, settings.merit, solution);
@@ -467,11 +483,13 @@ Result solve_global(const P& problem, const P& given, const Request& request,
   const auto prove = [&](const Vector& y) { return prove_no_solution(given, y); };
   const MeritKind kind = request.settings.merit;
   const Friction friction = friction_of(problem);
-  Factorization mass(to_eigen(problem.M), "M");
+  Kept& kept = request.kept;
+  Factorization mass =
+      kept.mass ? *std::exchange(kept.mass, {}) : Factorization(to_eigen(problem.M), "M");
   if (auto known = known_solution(problem, friction, mass, request, guess)) {
     return *std::move(known);
   }
-  const Condensation condensation(problem, std::move(mass), &request.deadline);
+  Condensation condensation(problem, std::move(mass), &request.deadline);
   const LocalProblem& local = condensation.local();
   if (!condensation.finished()) return out_of_time(problem, condensation, request, guess);
   const OwnSizes own = own_sizes(problem, condensation.mass(), &local);
@@ -488,7 +506,9 @@ Result solve_global(const P& problem, const P& given, const Request& request,
   Measure measure(local, own, kind);
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction, std::move(measure), request, guess, judge, prove, &primal);
+    Result result = run(local, friction, std::move(measure), request, guess, judge, prove, &primal);
+    kept = {condensation.take_mass(), own};
+    return result;
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
@@ -537,18 +557,29 @@ Result solve_consistent(const P& given, const Request& request, const Solution& 
   return result;
 }
 
-/// What every solve does: checks and times.
+/// What every solve does: checks and times, and a second solve from what the caller prefers.
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
-                 const OptionValues& options, const Solution& guess, const Form& form) {
+                 const OptionValues& options, const Solution& guess, const Preference& prefer,
+                 const Form& form) {
   check_tolerance(settings.tolerance);
-  Stopwatch watch;
-  const Deadline deadline(settings.time_limit, settings.clock);
-  const Request request{solver, settings, options, deadline, watch};
-  require_solvable(problem, request.solver, guess);
-  Result result = form(problem, request, guess);
-  result.setup_s += watch.read().cpu;  // the time of the thread in the solver is already taken off
-  return result;
+  Kept kept;
+  const auto solve_from = [&](const Solution& start) {
+    Stopwatch watch;
+    const Deadline deadline(settings.time_limit, settings.clock);
+    const Request request{solver, settings, options, deadline, watch, kept};
+    require_solvable(problem, request.solver, start);
+    Result result = form(problem, request, start);
+    // the time of the thread in the solver is already taken off
+    result.setup_s += watch.read().cpu;
+    return result;
+  };
+  Result result = solve_from(guess);
+  if (!prefer || !result.converged() || result.iterations == 0) return result;
+  const std::optional<Vector> preferred = prefer(result.solution);
+  if (!preferred) return result;
+  Result again = solve_from({.v = {}, .u = {}, .r = *preferred, .l = {}});
+  return again.converged() ? again : result;
 }
 
 }  // namespace
@@ -566,17 +597,17 @@ const Solver& find_solver(std::string_view name) {
 
 template <class P>
 Result solve(const P& problem, const Solver& solver, const Settings& settings,
-             const OptionValues& options, const Solution& guess) {
+             const OptionValues& options, const Solution& guess, const Preference& prefer) {
   if constexpr (std::derived_from<P, GlobalProblem>) {
-    return solve_any(problem, solver, settings, options, guess, solve_consistent<P>);
+    return solve_any(problem, solver, settings, options, guess, prefer, solve_consistent<P>);
   } else {
-    return solve_any(problem, solver, settings, options, guess, solve_local<P>);
+    return solve_any(problem, solver, settings, options, guess, prefer, solve_local<P>);
   }
 }
 
 #define FCLIB_INSTANTIATE(P)                                                              \
   template Result solve<P>(const P&, const Solver&, const Settings&, const OptionValues&, \
-                           const Solution&);
+                           const Solution&, const Preference&);
 FCLIB_FOR_EACH_FORMULATION(FCLIB_INSTANTIATE)
 #undef FCLIB_INSTANTIATE
 

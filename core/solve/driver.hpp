@@ -2,6 +2,7 @@
 // back to the formulation of the problem, and the merit judges it.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,16 +39,23 @@ struct Result {
   [[nodiscard]] bool converged() const { return status == Status::converged; }
 };
 
+/// Other reactions than those of a solution, or none.
+using Preference = std::function<std::optional<Vector>(const Solution&)>;
+
 /// Solves a problem of any formulation. `guess` may be empty; only its r is used.
+///
+/// If the solution took iterations and `prefer` names other reactions, the problem is solved again
+/// from these. That result is returned if it converged.
 ///
 /// Throws Error: (problem) for invalid data, (option) for an unknown solver or option, (unsuitable)
 /// if the problem cannot be brought to the form that the solver takes.
 template <class P>
 Result solve(const P& problem, const Solver& solver, const Settings& settings = {},
-             const OptionValues& options = {}, const Solution& guess = {});
+             const OptionValues& options = {}, const Solution& guess = {},
+             const Preference& prefer = {});
 #define FCLIB_DECLARE(P)                                                                         \
   extern template Result solve<P>(const P&, const Solver&, const Settings&, const OptionValues&, \
-                                  const Solution&);
+                                  const Solution&, const Preference&);
 FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
 #undef FCLIB_DECLARE
 

@@ -98,6 +98,23 @@ Matrix sum(const Columns& a, double factor, const Columns& b) {
   return made;
 }
 
+Matrix chosen_entries(std::span<const double> values, std::span<const std::int64_t> number,
+                      std::span<const Index> row, std::span<const Index> start, Index rows) {
+  const std::size_t cols = start.size() - 1;
+  Matrix made = by_columns(rows, static_cast<Index>(cols), number.size());
+  for (std::size_t col = 0; col < cols; ++col) {
+    for (auto k = static_cast<std::size_t>(start[col]);
+         k < static_cast<std::size_t>(start[col + 1]); ++k) {
+      const double value = values[static_cast<std::size_t>(number[k])];
+      if (value == 0) continue;
+      made.i.push_back(row[k]);
+      made.x.push_back(value);
+    }
+    close_column(made);
+  }
+  return made;
+}
+
 Matrix part(const Columns& a, std::span<const Index> columns, std::span<const Index> number,
             Index rows) {
   std::size_t room = 0;

@@ -4,6 +4,7 @@
 // last bit, whoever makes it.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,11 @@ double product(const Columns& a, Index col, std::span<const double> x);
 
 /// A + factor B, by rows in order in each column, without zeros. A itself if B has no entries.
 Matrix sum(const Columns& a, double factor, const Columns& b);
+
+/// A matrix by columns, of `rows` rows, of the values of some numbers; those that are 0 are left
+/// out. `row` has the row of each, and `start` where each column starts, and the end.
+Matrix chosen_entries(std::span<const double> values, std::span<const std::int64_t> number,
+                      std::span<const Index> row, std::span<const Index> start, Index rows);
 
 /// Some columns of a matrix. With `number` (rows), the row r becomes number[r] of `rows` ones, and
 /// it is left out if that is negative.

@@ -1,7 +1,9 @@
 #include "stepping/rigid.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace fclib::stepping {
 
@@ -109,6 +111,23 @@ void speeds_of(std::span<const double> twist, std::span<const std::int64_t> body
       turning += omega[k] * omega[k];
     }
     speed[g] = std::sqrt(square) + std::sqrt(turning) * radius[g];
+  }
+}
+
+void set_margins(std::span<const double> own, std::span<const double> reach,
+                 std::span<const std::int64_t> owner, std::span<const std::int64_t> first,
+                 const Margins& margins) {
+  // NaN wins
+  const auto larger = [](double a, double b) { return a >= b || std::isnan(a) ? a : b; };
+  const std::span<double> all = margins.geometry;
+  for (std::size_t g = 0; g < all.size(); ++g) all[g] = larger(own[g], reach[g]);
+  std::fill(margins.body.begin(), margins.body.end(), 0.0);
+  for (std::size_t k = 0; k < owner.size(); ++k) {
+    const auto start = static_cast<std::size_t>(first[k]);
+    const auto past = k + 1 < first.size() ? static_cast<std::size_t>(first[k + 1]) : all.size();
+    margins.body[static_cast<std::size_t>(owner[k])] =
+        std::accumulate(all.begin() + static_cast<std::ptrdiff_t>(start) + 1,
+                        all.begin() + static_cast<std::ptrdiff_t>(past), all[start], larger);
   }
 }
 

@@ -82,4 +82,19 @@ void speeds_of(std::span<const double> twist, std::span<const std::int64_t> body
                std::span<const double> place, std::span<const double> radius,
                std::span<double> speed);
 
+/// The margins within which contacts are found: of geometries the larger one of their own and their
+/// reach, of bodies the largest one of their geometries.
+struct Margins {
+  std::span<double> geometry;  ///< (geometries) [m]
+  std::span<double> body;      ///< (bodies) [m], 0 without geometries
+};
+
+/// own      (geometries) [m]
+/// reach    (geometries) [m]
+/// owner    the bodies that have geometries
+/// first    of each of these its first geometry; those of a body follow each other
+void set_margins(std::span<const double> own, std::span<const double> reach,
+                 std::span<const std::int64_t> owner, std::span<const std::int64_t> first,
+                 const Margins& margins);
+
 }  // namespace fclib::stepping

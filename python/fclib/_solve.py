@@ -78,6 +78,35 @@ def solve(
             bilateral constraints contradict each other by more than ``tol``.
         SolverError: a solver outside of fclib failed.
     """
+    return solve_with(
+        solver,
+        tol,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        callback=callback,
+        history=history,
+        merit=merit,
+        **options,
+    )(problem, guess)
+
+
+def solve_with(
+    solver: str,
+    tol: float,
+    *,
+    max_iterations: int | None = None,
+    time_limit: float | None = None,
+    callback: Callable[[int, float, float, str], bool | np.bool_ | None] | None = None,
+    history: bool = False,
+    merit: MeritKind = "both",
+    **options: Value,
+) -> Callable[..., _core.Result]:
+    """`solve` of many problems: a function of the problem, the guess and `still`.
+
+    With `still`, and a guess: bodies that are slower, relative to their largest velocity without
+    reactions, get the reactions at rest that are the nearest to the guess, if these solve the
+    problem too.
+    """
     check_limits(tol, time_limit, max_iterations=max_iterations)
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
@@ -85,23 +114,34 @@ def solve(
         solver, own = parse_solver(solver)
         options = {**own, **options}
     values = {name: _plain(name, value) for name, value in options.items()} if options else {}
-    try:
-        return _core.solve(
-            problem,
-            find_solver(solver),
-            tol,
-            max_iterations or 0,
-            math.inf if time_limit is None else time_limit,
-            values,
-            guess,
-            callback,
-            history,
-            merit == "natural",
-        )
-    except TypeError:
-        limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
-        name_wrong_type(problem=problem, **limits, history=history, callback=callback)
-        raise  # the callback raised it
+    info = find_solver(solver)
+    iterations = max_iterations or 0
+    seconds = math.inf if time_limit is None else time_limit
+
+    def run(
+        problem: Problem, guess: Given | None = None, still: float | None = None
+    ) -> _core.Result:
+        try:
+            return _core.solve(
+                problem,
+                info,
+                tol,
+                iterations,
+                seconds,
+                values,
+                guess,
+                callback,
+                history,
+                merit == "natural",
+                None,
+                still,
+            )
+        except TypeError:
+            limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
+            name_wrong_type(problem=problem, **limits, history=history, callback=callback)
+            raise  # the callback raised it
+
+    return run
 
 
 def check_limits(

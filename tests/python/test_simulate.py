@@ -54,6 +54,10 @@ PLANE_LOOP = """
   <geom type="capsule" size="0.02" fromto="0 0 0 0 0 0.7" mass="1"/></body>
 """
 PLANE_CONNECT = '<equality><connect body1="b" body2="c" anchor="1 0 0.2"/></equality>'
+ARM_OF_SLIDES = """
+<mujoco><worldbody><body><joint type="slide" axis="1 0 0"/><geom size="0.1"/>
+<body><joint type="slide" axis="0 1 0"/><geom size="0.1"/></body></body></worldbody></mujoco>
+"""
 ARM = """
 <body name="arm" pos="0 0 1"><joint name="shoulder" type="ball"/>
   <geom type="capsule" size="0.05" fromto="0 0 0 0.6 0 -0.3" mass="1"/>
@@ -395,6 +399,34 @@ def test_gap_law_undoes_a_share_of_a_penetration() -> None:
     first = run(mjcf(SPHERE, z=0.09), 1, law="gap")[0]
     np.testing.assert_allclose(first.problem.w, [0.2 * -0.01 / H, 0, 0], rtol=1e-9)
     assert first.result.solution.v[2] == pytest.approx(0.2 * 0.01 / H, rel=1e-6)
+
+
+def test_margins_are_the_reach_of_geometries() -> None:
+    xml = (
+        '<mujoco><worldbody><geom type="plane" size="1 1 1" margin="0.5"/>'
+        '<body pos="0 0 1"><freejoint/><geom size="0.1" pos="1 0 0"/><geom size="0.2"/></body>'
+        '<body/><body pos="0 0 3"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    model = MujocoModel(Scene(name="reach", xml=xml))
+    v = np.array([3.0, 0, 4.0, 0, 0, 0, 0, 2.0, 0, 0, 0, 1.0])
+    model.set_state(model.position, v)
+    model.assemble(H)
+    slack = model.model.geom_margin - H**2 * G
+    # the plane keeps its own margin; a sphere that turns reaches further by its radius
+    np.testing.assert_allclose(model.model.geom_margin[0], 0.5)
+    np.testing.assert_allclose(slack[1:] / H, [5, 5, 2.1], rtol=1e-6)
+    np.testing.assert_allclose(
+        model.model.body_margin, [0.5, *model.model.geom_margin[[1]], 0, model.model.geom_margin[3]]
+    )
+
+
+def test_the_mass_matrix_has_no_zeros() -> None:
+    model = MujocoModel(Scene(name="slides", xml=ARM_OF_SLIDES))
+    M = model.assemble(H).M
+    mass = 4e3 / 3 * math.pi * 0.1**3
+    np.testing.assert_allclose(M.toarray(), np.diag([2 * mass, mass]))
+    # slides at right angles have no inertia in common
+    assert M.nnz == 2
 
 
 def test_only_active_contacts_enter() -> None:

@@ -34,8 +34,8 @@ from fclib.simulate import (  # noqa: E402
 from fclib.simulate import simulation as module  # noqa: E402
 from fclib.simulate.geometry import places_of  # noqa: E402
 from fclib.simulate.simulation import (  # noqa: E402
+    STILL,
     carry_over,
-    nearest,
     same_contacts,
     trouble,
 )
@@ -212,22 +212,24 @@ def test_an_arch_at_rest_keeps_its_corners_and_reactions() -> None:
             assert np.abs(step.position - known[0]).max() < 1e-7
 
 
-def test_reactions_at_rest_stay_whatever_the_solver_returns(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_reactions_at_rest_stay_whatever_the_solver_returns() -> None:
     """One that begins from 0, and goes through the contacts in another order at each step."""
-    solve = fclib.solve
     seen: list[Any] = []
 
-    def cold(problem: Any, *arguments: Any, **options: Any) -> Any:
-        if not any(problem is one for one in seen):
-            seen.append(problem)
-            return solve(problem, "nsgs", 1e-8, shuffle="once", seed=len(seen))
-        return solve(problem, *arguments, **options)
+    @fclib.solver("t-cold")
+    def cold(problem: Any, r: Any, monitor: Any) -> Any:
+        monitor.stop(r)
+        if not any(np.array_equal(problem.q, one) for one in seen):
+            seen.append(np.array(problem.q))
+            r = fclib.solve(problem, "nsgs", 1e-8, shuffle="once", seed=len(seen)).solution.r
+        monitor.stop(r)
+        return r
 
-    monkeypatch.setattr(fclib._solve, "solve", cold)
     known: Any = None
-    for step in simulate(Scene(name="two", xml=boxes(2)), 8):
+    # with a callback, a guess that is a solution goes to the solver too
+    scene = Scene(name="two", xml=boxes(2))
+    for step in simulate(scene, 8, solver="t-cold", callback=lambda *report: None):
+        assert len(seen) == step.index + 1
         r = np.reshape(step.result.solution.r, (-1, 3))
         places = places_of(step.model, step.contacts)
         known = known or (step.contacts.pair, places, r)
@@ -241,7 +243,7 @@ def test_reactions_nearest_to_others_move_nothing() -> None:
     # another solution: the reactions of a self-stress of two corners of one joint added
     other = np.array(solution.r)
     other += 1e-3 * np.random.default_rng(0).standard_normal(len(other))
-    near = nearest(problem, solution, other)
+    near = _core.nearest_at_rest(problem, solution, other, STILL)
     assert near is not None
     assert np.abs(near - other).max() < np.abs(solution.r - other).max()
     change = problem.H @ (near - solution.r)
@@ -250,6 +252,28 @@ def test_reactions_nearest_to_others_move_nothing() -> None:
     left = other - near
     null = scipy.linalg.null_space(dense(problem.H))
     assert np.abs(null.T @ left).max() < 1e-9
+
+
+def test_a_second_solve_finds_what_it_does_alone() -> None:
+    """It takes the factors of the first one over, and its result is the same to the last bit."""
+    steps = run(boxes(3), 4)
+    problem, solver = steps[-1].problem, fclib.find_solver("auto")
+
+    def solved(guess: Any, still: float | None = None) -> Any:
+        return _core.solve(
+            problem, solver, 1e-8, 0, math.inf, {}, guess, None, False, False, still=still
+        )
+
+    guess = 1.3 * fclib.solve(problem).solution.r
+    first = solved(guess)
+    assert first.iterations
+    near = _core.nearest_at_rest(problem, first.solution, guess, STILL)
+    assert near is not None
+    both = solved(guess, STILL)
+    assert both == solved(near)
+    assert both != first
+    # bodies that count as moving are not solved again
+    assert solved(guess, -1.0) == first
 
 
 def test_a_published_family_has_no_allowance() -> None:
@@ -332,7 +356,7 @@ def test_a_step_that_is_not_solved_can_stop() -> None:
 def test_no_velocity_that_makes_no_sense_goes_on(
     bad: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    solve = fclib._solve.solve
+    solve = _core.solve
 
     def wrong(problem: Any, *arguments: Any, **options: Any) -> Any:
         class Wrong:
@@ -341,7 +365,7 @@ def test_no_velocity_that_makes_no_sense_goes_on(
 
         return Wrong() if problem.nc else solve(problem, *arguments, **options)
 
-    monkeypatch.setattr(fclib._solve, "solve", wrong)
+    monkeypatch.setattr(_core, "solve", wrong)
     with pytest.raises(StoppedError, match="step 0: its velocity is out of range"):
         run(boxes(1), 3)
 
@@ -906,7 +930,7 @@ def test_the_rounding_of_large_reactions_at_rest_is_removed() -> None:
     size = 1e6 * np.abs(solution.r).max()
     large = solution.r + size * null @ rng.uniform(-1, 1, null.shape[1])
     turned = large * (1 + 1e-9 * rng.standard_normal(len(large)))
-    near = nearest(problem, solution, turned)
+    near = _core.nearest_at_rest(problem, solution, turned, STILL)
     assert near is not None
     pushed, left = (np.abs(H @ (r - solution.r)).max() for r in (turned, near))
     assert pushed > 1e-4 * np.abs(problem.f).max()

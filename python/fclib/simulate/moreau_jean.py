@@ -295,8 +295,7 @@ class MoreauJean:
         active: npt.NDArray[Any] | None = None
         w_n: Vector
         if self.law == "velocity":
-            active, before = self.touching(system, v)
-            w_n = self.restitution * before
+            active, w_n = self.touching(system, v)
         else:
             middle = contacts.gap
             if self.theta < 1:
@@ -324,7 +323,8 @@ class MoreauJean:
             system.G,
             system.force,
             v,
-            self.stabilization / h * system.violation,
+            system.violation,
+            self.stabilization / h,
             w_n,
             active,
             system.tree,
@@ -341,6 +341,9 @@ class MoreauJean:
         if dofs is None:
             dofs = all_of(len(v))
 
+        if rest is None and system.driven is None:
+            return StepProblem(problem, contacts, dofs, None)
+
         def free() -> Vector:
             velocity = np.zeros_like(v)
             if system.driven is not None:
@@ -356,9 +359,9 @@ class MoreauJean:
         return StepProblem(problem, contacts, dofs, free)
 
     def touching(self, system: System, v: Vector) -> tuple[npt.NDArray[np.int64], Vector]:
-        """The active contacts by the velocity law, and their normal velocities before the step."""
+        """The active contacts by the velocity law, and their w_N = e u_N^-."""
         contacts, surface = system.contacts, system.shape_rounding
-        active, before, crowded = _core.active_contacts(
+        active, w_n, crowded = _core.active_contacts(
             system.H,
             system.M,
             v,
@@ -374,14 +377,15 @@ class MoreauJean:
             None if surface is None else ROUNDINGS * surface,
             self.activation,
             FACE,
+            self.restitution,
         )
         if crowded:
             kept = np.ones(len(active), dtype=bool)
             for own, off in crowded:
                 which = active[own]
                 kept[own] = outer(contacts.point[which], contacts.frame[which, 0], off)
-            active, before = active[kept], before[kept]
-        return active, before
+            active, w_n = active[kept], w_n[kept]
+        return active, w_n
 
     def seen(
         self, interaction: npt.NDArray[np.int64], middle: Vector
@@ -406,14 +410,16 @@ class StepProblem:
     contacts: Contacts  # nc, the active ones
     # (n') degrees of freedom of the system that the problem has; its auxiliary ones follow
     dofs: npt.NDArray[np.int64]
-    # (n) velocity of the others after the step, 0 at `dofs`; a call solves for it
-    free: Callable[[], Vector]
+    # (n) velocity of the others after the step, 0 at `dofs`; a call solves for it. None: no others
+    free: Callable[[], Vector] | None
 
     def after(self, v: Vector | None) -> Vector:
         """The velocity (n) of the whole system after the step, from that of the problem."""
+        own = np.zeros(0) if v is None else v[: len(self.dofs)]
+        if self.free is None:
+            return own.copy()
         velocity = self.free()
-        if v is not None:
-            velocity[self.dofs] = v[: len(self.dofs)]
+        velocity[self.dofs] = own
         return velocity
 
 

@@ -32,7 +32,6 @@ from fclib.simulate._mujoco import mujoco
 from fclib.simulate.arrays import (
     Sparse,
     Vector,
-    by_columns,
     lengths_of,
     matrix_of,
     pointers,
@@ -93,6 +92,7 @@ class MujocoModel:
         self.model: Any
         self.model, dropped = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
+        self._warned = self.data.warning.number  # a view
         self.left_out = (*scene.left_out, *left_out(scene, self.model), *dropped)
         self.untouchable = cannot_touch(self.model)  # the reason, in words
         if strict:
@@ -179,6 +179,9 @@ class MujocoModel:
     def position(self) -> Vector:
         """Configuration (q, states of actuators, time, controls), a copy."""
         d = self.data
+        if not self.model.na and not self.timed and not self.controlled:
+            own: Vector = d.qpos.copy()
+            return own
         parts = [d.qpos, d.act]
         if self.timed:
             parts.append([d.time])
@@ -368,12 +371,10 @@ class MujocoModel:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
             speed = speed[self._cell.geometry]
-        reach = h * speed + h**2 * self._gravity + self._slack
-        margin = np.maximum(self._margin, reach)
-        m.geom_margin[:] = margin
-        m.body_margin[:] = 0
-        if len(margin):
-            m.body_margin[self._owners] = np.maximum.reduceat(margin, self._first)
+        fall = h**2 * self._gravity
+        reach = _core.set_margins(
+            m, speed, h, fall, self._slack, self._margin, self._owners, self._first
+        )
         if m.npair:
             pair = np.column_stack((m.pair_geom1, m.pair_geom2))
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
@@ -392,13 +393,13 @@ class MujocoModel:
         else:
             mujoco.mj_passive(m, d)
             mujoco.mj_rne(m, d, 0, d.qfrc_bias)
-        force: Vector = d.qfrc_passive + d.qfrc_applied - d.qfrc_bias
+        force, pushed = _core.other_forces(d)
         linear = None
         if m.nu:
             mujoco.mj_fwdActuation(m, d)
         if m.nu and not self._servos.limited:
             force += d.qfrc_actuator
-        if d.xfrc_applied.any():
+        if pushed:
             for body in np.flatnonzero(d.xfrc_applied.any(axis=1)):
                 push = d.xfrc_applied[body]
                 mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
@@ -414,7 +415,7 @@ class MujocoModel:
             raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
 
     def _check_warnings(self) -> None:
-        warned = self.data.warning.number
+        warned = self._warned
         if warned[CONTACTS_FULL] or warned[ROWS_FULL]:
             raise MemoryError(
                 f"{self.scene.name}: MuJoCo's memory for contacts is full; raise"
@@ -546,10 +547,8 @@ class MassPattern:
     def fill(self, values: Vector) -> Sparse:
         """M (n x n), by columns and without explicit zeros."""
         n = len(self.pointers) - 1
-        entries = values.take(self.entries)
-        if entries.all():
-            return by_columns(entries, self.rows, self.pointers, (n, n))
-        return without_zeros(entries, self.rows, self.pointers, (n, n))
+        arrays = _core.chosen_entries(values, self.entries, self.rows, self.pointers)
+        return matrix_of(arrays, (n, n))
 
 
 def mass_pattern(m: Any) -> MassPattern:

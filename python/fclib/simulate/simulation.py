@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -40,7 +39,9 @@ NONSENSE: Final = 1.0
 # largest state, in quanta of stored ones: doubles hold integers up to here
 LARGEST: Final = 2.0**53
 
-# bodies are at rest below this speed at contacts, relative to the largest without reactions
+# Bodies are at rest below this speed at contacts, relative to the largest without reactions. Many
+# reactions hold such bodies. A solver returns any of them: those nearest to the last ones are
+# taken, or else the reactions of a body at rest would change from step to step.
 STILL: Final = 1e-6
 
 Unsolved: TypeAlias = Literal["best", "stop"]
@@ -203,6 +204,9 @@ def _march(
     )
     spin = bool(getattr(model, "spin", False))
     info_of = descriptions(model.scene, scheme, settings, model.left_out, spin=spin)
+    options = dict(settings["options"])
+    first = options.pop("guess", None)
+    solve = _solve.solve_with(settings["solver"], settings["tol"], **options)
     for index in range(state.index, state.index + steps):
         if control is not None:
             assert isinstance(model, MujocoModel)
@@ -212,21 +216,14 @@ def _march(
         part = scheme.problem(system, model.velocity, info_of(index))
         problem, contacts = part.problem, part.contacts
 
-        options: dict[str, Any] = dict(settings["options"])
         places = places_of(model, contacts)
+        guess, still = first, None
         if settings["warm_start"] and problem.nc and len(state.r):
-            options["guess"] = _core.Solution(r=carry_over(state, contacts, places))
+            guess, still = carry_over(state, contacts, places), STILL
         try:
-            solve = functools.partial(
-                _solve.solve, problem, settings["solver"], tol=settings["tol"]
-            )
-            result = solve(**options)
-            if "guess" in options and result.converged and result.iterations:
-                near = nearest(problem, result.solution, options["guess"].r)
-                if near is not None:
-                    again = solve(**options | {"guess": _core.Solution(r=near)})
-                    result = again if again.converged else result
-            after = part.after(result.solution.v)
+            result = solve(problem, guess, still)
+            solution = result.solution
+            after = part.after(solution.v)
         except _core.UnsuitableError as error:
             word = contradiction(model, system)
             if not word:
@@ -249,30 +246,15 @@ def _march(
             model,
         )
         model.integrate(scheme.h, after, scheme.theta)
-        r = np.reshape(result.solution.r, (-1, contacts.dimension))
+        r = solution.r.reshape(-1, contacts.dimension)
         state = State(
             index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r, places
         )
-        if not in_range(state.position, LARGEST * system.rounding):
+        if not _core.are_within(state.position, LARGEST * system.rounding):
             raise StoppedError(
                 f"{model.scene.name}, step {index}: leads to a position that is out of range"
                 f" ({largest(state.position):.3g})"
             )
-
-
-def nearest(problem: _laws.Global, solution: _core.Solution, r: Vector) -> Vector | None:
-    """The reactions nearest to r (m) of bodies at rest, without the cones; None: bodies move.
-
-    Reactions of sticking contacts may change by any dr that moves nothing, H dr = 0. A solver
-    returns any of these, so that the reactions of a body at rest would change from step to step.
-    """
-    found: Vector | None = _core.nearest_at_rest(problem, solution, r, STILL)
-    return found
-
-
-def in_range(values: Vector, bound: float) -> bool:
-    """Whether all are finite and below a bound, so that the state can be stored."""
-    return bool((np.abs(values) < bound).all())
 
 
 def largest(values: Vector) -> float:
@@ -289,7 +271,7 @@ def trouble(
     stop: bool,
 ) -> str:
     """Why a simulation cannot go on after a step, in words; empty if it can."""
-    known = in_range(velocity, bound)
+    known = _core.are_within(velocity, bound)
     if known and result.converged:
         return ""
     found = f"{result.solver}: {result.status}, error {result.error:.2g}"

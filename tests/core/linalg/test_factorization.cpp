@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "error.hpp"
@@ -96,6 +97,36 @@ TEST(Factorization, gram_is_the_same_of_dense_and_of_sparse_rows) {
   }
   const Eigen::MatrixXd product = dense.transpose() * dense;
   EXPECT_LT((Eigen::MatrixXd(few) - product).norm(), 1e-12 * product.norm());
+}
+
+TEST(Factorization, gram_diagonal_is_that_of_gram_to_the_last_bit) {
+  // columns of different rows, also none, and a number of them that no block of columns divides
+  testing::RandomData random(8);
+  const SparseColumns a = random.definite(12, 0.3);
+  Eigen::MatrixXd dense = random.dense(12, 11);
+  dense = (dense.array() < 0.3).select(0.0, dense);
+  dense.col(4).setZero();
+  const SparseColumns b = dense.sparseView();
+  const Factorization factorization(a, "A");
+  const SparseColumns gram = factorization.gram(b);
+  const Vector diagonal = factorization.gram_diagonal(b);
+  ASSERT_EQ(diagonal.size(), 11);
+  for (Eigen::Index k = 0; k < diagonal.size(); ++k) EXPECT_EQ(diagonal[k], gram.coeff(k, k));
+  EXPECT_EQ(diagonal[4], 0);
+}
+
+TEST(Factorization, an_infinite_entry_of_gram_leaves_the_others_finite) {
+  SparseColumns one(2, 2);
+  one.setIdentity();
+  SparseColumns b(2, 3);
+  b.insert(0, 0) = 1;
+  b.insert(1, 1) = 2;
+  b.insert(0, 2) = std::numeric_limits<double>::infinity();
+  b.insert(1, 2) = 3;
+  const SparseColumns gram = Factorization(one, "A").gram(b);
+  EXPECT_EQ(gram.coeff(1, 1), 4);
+  EXPECT_EQ(gram.coeff(2, 1), 6);
+  EXPECT_EQ(gram.coeff(2, 0), std::numeric_limits<double>::infinity());
 }
 
 TEST(Factorization, gram_is_symmetric_and_keeps_bodies_apart) {

@@ -48,6 +48,22 @@ EIGEN_ALWAYS_INLINE Wide map_square(const Wide& mu, const Wide& over, const Wide
   return square;
 }
 
+/// Whether W (m x m) of `nc` contacts has no block of zeros. Else it may have islands, and there is
+/// less to compute.
+template <int D>
+bool is_full(int nc, const double* W) {
+  const int m = D * nc;
+  for (int row = 0; row < m; row += D) {
+    for (int column = 0; column < m; column += D) {
+      const double* const block = W + row * m + column;
+      bool empty = block[0] == 0;
+      for (int k = 1; empty && k < D * D; ++k) empty = block[k / D * m + k % D] == 0;
+      if (empty) return false;
+    }
+  }
+  return true;
+}
+
 /// r moved against u, and put on the disk of its normal part.
 template <int D, class Wide>
 EIGEN_ALWAYS_INLINE void projected_step(const Wide& normal, const Wide& tangent, const Wide& mu, const Wide* u,
@@ -180,6 +196,7 @@ template <int D>
 bool Lanes<D>::load(int number, std::int64_t k, const LocalArrays& arrays) {
   Lane& lane = lanes_[number];
   const int m = D * nc_;
+  if (!is_full<D>(nc_, arrays.W)) return false;
   const auto all = [](const double* x, int size) {
     return Eigen::Map<const Eigen::VectorXd>(x, size).squaredNorm();
   };

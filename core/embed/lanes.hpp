@@ -49,7 +49,7 @@ class Lanes {
                                                const LocalArrays& first);
 
   /// Problems of `nc` contacts. Calls answered(k, answer) for each, in the order in which they
-  /// end.
+  /// end; those with a block of zeros in W are left to SmallSolver.
   template <class Answered>
   void solve(double tolerance, Index nc, std::int64_t count, const LocalArrays& first,
              const Answered& answered) {

@@ -31,8 +31,8 @@ EIGEN_ALWAYS_INLINE Wide tangential_norm(const Wide* x) {
 /// The square of the natural map with rho, as in contact/coulomb.hpp, in each lane. The projection
 /// is chosen by minima and maxima, without a branch. Its rounding is that of u^ = u + mu ||u_T||.
 template <int D, class Wide>
-EIGEN_ALWAYS_INLINE Wide map_square(const Wide& mu, const Wide& over, const Wide& slip, const Wide& rho, const Wide* u,
-                const Wide* r) {
+EIGEN_ALWAYS_INLINE Wide map_square(const Wide& mu, const Wide& over, const Wide& slip,
+                                    const Wide& rho, const Wide* u, const Wide* r) {
   Wide y[D];
   for (int i = 1; i < D; ++i) y[i] = r[i] - rho * u[i];
   y[0] = r[0] - rho * (u[0] + slip);
@@ -66,8 +66,8 @@ bool is_full(int nc, const double* W) {
 
 /// r moved against u, and put on the disk of its normal part.
 template <int D, class Wide>
-EIGEN_ALWAYS_INLINE void projected_step(const Wide& normal, const Wide& tangent, const Wide& mu, const Wide* u,
-                    Wide* r) {
+EIGEN_ALWAYS_INLINE void projected_step(const Wide& normal, const Wide& tangent, const Wide& mu,
+                                        const Wide* u, Wide* r) {
   r[0] = (r[0] - normal * u[0]).max(0.0);
   for (int i = 1; i < D; ++i) r[i] -= tangent * u[i];
   const Wide scale = (mu * r[0] / tangential_norm<D>(r).max(tiny)).min(1.0);
@@ -148,8 +148,7 @@ std::array<typename Lanes<D>::Answer, Lanes<D>::width> Lanes<D>::solve_alone(
     const Wide down = u[0].min(0.0);
     const Wide error = (map.max(down * down) * over_square).sqrt();
     // as BoundedError has it; as an impulse the map is no more than as a velocity
-    const Wide rounding =
-        unit * (error + (mu + 1) * (terms + lengths * over_rho) * over_scale);
+    const Wide rounding = unit * (error + (mu + 1) * (terms + lengths * over_rho) * over_scale);
     const Wide bound = error + rounding;
     for (int k = 0; k < count; ++k) {
       if ((left >> k & 1U) == 0) continue;
@@ -401,9 +400,9 @@ bool Lanes<D>::judge(const Lane& lane, const double* r, double* u, double& error
   const double speed = std::sqrt(count) * (scale + lane.size * std::sqrt(lengths)) + count * scale;
   const double unit = unit_of_rounding<D>(nc_);
   const double rounding =
-      unit * (error + (1 + lane.friction) *
-                          larger_error((speed + size * std::max(1.0, lane.most)) / scale,
-                                       (speed / lane.least + size) / lane.scaled_scale));
+      unit *
+      (error + (1 + lane.friction) * larger_error((speed + size * std::max(1.0, lane.most)) / scale,
+                                                  (speed / lane.least + size) / lane.scaled_scale));
   bound = error + rounding;
   if (!std::isfinite(lengths)) error = std::numeric_limits<double>::infinity();
   return rounding <= bounded_excess * tolerance_;

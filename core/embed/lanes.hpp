@@ -95,9 +95,9 @@ class Lanes {
     std::int64_t k = -1;
     LocalArrays arrays{};
     int sweeps = 0;
-    double last = 0;    // change of the sweep before
-    double size = 0;    // ||W||, of Frobenius
-    double friction = 0;  // largest mu
+    double last = 0;             // change of the sweep before
+    double size = 0;             // ||W||, of Frobenius
+    double friction = 0;         // largest mu
     double least = 0, most = 0;  // of the sizes of the contacts, 1 / rho
     double scale = 1, scaled_scale = 1;
     std::array<double, most_contacts> rho{};

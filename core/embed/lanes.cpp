@@ -64,6 +64,24 @@ bool is_full(int nc, const double* W) {
   return true;
 }
 
+/// q + W r of a contact, whose rows (D x m) are `rows`; two columns at a time.
+template <int D>
+EIGEN_ALWAYS_INLINE void add_rows(int m, const double* rows, const double* q, const double* r,
+                                  double* sums) {
+  using Two = Eigen::Array2d;
+  Two pairs[D];
+  for (int i = 0; i < D; ++i) pairs[i].setZero();
+  int j = 0;
+  for (; j + 1 < m; j += 2) {
+    const Two both = Eigen::Map<const Two>(r + j);
+    for (int i = 0; i < D; ++i) pairs[i] += Eigen::Map<const Two>(rows + i * m + j) * both;
+  }
+  for (int i = 0; i < D; ++i) {
+    sums[i] = q[i] + pairs[i].sum();
+    if (j < m) sums[i] += rows[i * m + j] * r[j];
+  }
+}
+
 /// r moved against u, and put on the disk of its normal part.
 template <int D, class Wide>
 EIGEN_ALWAYS_INLINE void projected_step(const Wide& normal, const Wide& tangent, const Wide& mu,
@@ -178,6 +196,7 @@ template <int D>
 void Lanes<D>::begin(double tolerance, Index nc) {
   tolerance_ = tolerance;
   nc_ = static_cast<int>(nc);
+  root_ = std::sqrt(static_cast<double>(nc));
   const auto count = static_cast<std::size_t>(nc);
   rule_ = SweepRule(StepCosts(D, count, count * (count - 1)), part_of_sweep);
   for (int lane = 0; lane < width; ++lane) clear(lane);
@@ -224,6 +243,7 @@ bool Lanes<D>::load(int number, std::int64_t k, const LocalArrays& arrays) {
     const double rho = 1 / size;
     lane.friction = std::max(lane.friction, mu);
     lane.rho[a] = rho;
+    lane.size_of[a] = size;
     lane.least = std::min(lane.least, size);
     lane.most = std::max(lane.most, size);
     squares += square;
@@ -353,19 +373,16 @@ bool Lanes<D>::judge(const Lane& lane, const double* r, double* u, double& error
   Wide wide_r[groups][D];
   Wide wide_mu[groups];
   Wide wide_rho[groups];
+  Wide wide_size[groups];
   for (int group = 0; group < groups; ++group) {
     for (int i = 0; i < D; ++i) wide_u[group][i] = wide_r[group][i] = Wide::Zero();
     wide_mu[group] = Wide::Zero();
-    wide_rho[group] = Wide::Ones();
+    wide_rho[group] = wide_size[group] = Wide::Ones();
   }
   double lengths = 0;
   for (int a = 0; a < nc_; ++a) {
-    const double* const rows = lane.arrays.W + D * a * m;
     double sums[D];
-    for (int i = 0; i < D; ++i) sums[i] = lane.arrays.q[D * a + i];
-    for (int j = 0; j < m; ++j) {
-      for (int i = 0; i < D; ++i) sums[i] += rows[i * m + j] * r[j];
-    }
+    add_rows<D>(m, lane.arrays.W + D * a * m, lane.arrays.q + D * a, r, sums);
     const int group = a / width;
     const int place = a % width;
     for (int i = 0; i < D; ++i) {
@@ -376,6 +393,7 @@ bool Lanes<D>::judge(const Lane& lane, const double* r, double* u, double& error
     }
     wide_mu[group][place] = lane.arrays.mu[a];
     wide_rho[group][place] = lane.rho[a];
+    wide_size[group][place] = lane.size_of[a];
   }
   Wide plain = Wide::Zero();
   Wide impulses = Wide::Zero();
@@ -389,15 +407,15 @@ bool Lanes<D>::judge(const Lane& lane, const double* r, double* u, double& error
     const Wide square = map_square<D>(mu, over, slip, rho, wide_u[group], wide_r[group]);
     const Wide down = wide_u[group][0].min(0.0);
     impulses += square;
-    velocities += (square / (rho * rho)).max(down * down);
+    velocities += (square * wide_size[group] * wide_size[group]).max(down * down);
   }
   const double scale = lane.scale;
   error = larger_error(std::sqrt(larger_error(plain.sum(), velocities.sum())) / scale,
                        std::sqrt(impulses.sum()) / lane.scaled_scale);
   // as BoundedError has it; the sizes of all terms of u are at most ||q|| + ||W|| ||r||
-  const double count = nc_;
-  const double size = std::sqrt(count * lengths);
-  const double speed = std::sqrt(count) * (scale + lane.size * std::sqrt(lengths)) + count * scale;
+  const double length = std::sqrt(lengths);
+  const double size = root_ * length;
+  const double speed = root_ * (scale + lane.size * length) + nc_ * scale;
   const double unit = unit_of_rounding<D>(nc_);
   const double rounding =
       unit *

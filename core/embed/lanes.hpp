@@ -100,7 +100,7 @@ class Lanes {
     double friction = 0;         // largest mu
     double least = 0, most = 0;  // of the sizes of the contacts, 1 / rho
     double scale = 1, scaled_scale = 1;
-    std::array<double, most_contacts> rho{};
+    std::array<double, most_contacts> rho{}, size_of{};  // size_of is 1 / rho
   };
 
   void begin(double tolerance, Index nc);
@@ -112,6 +112,7 @@ class Lanes {
 
   double tolerance_ = 0;
   int nc_ = 0;
+  double root_ = 0;  // of nc
   SweepRule rule_{StepCosts(D, 1, 0)};
   std::array<Lane, width> lanes_;
   std::array<Wide, most_rows * most_rows> W_;  // of each contact, by columns

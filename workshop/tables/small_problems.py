@@ -200,8 +200,8 @@ def main() -> None:
             arguments.results,
             rows,
             title="Small problems on one core, cold and warm",
-            note=f"the least of {arguments.rounds} rounds or more, within {SECONDS:g} s, one for solvers "
-            "of other packages; "
+            note=f"the least of {arguments.rounds} rounds or more, within {SECONDS:g} s, one for "
+            "solvers of other packages; "
             f"worlds of each kind: {COUNTS}; worst error of the first {FEW}. {words}.",
         )
 

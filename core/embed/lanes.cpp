@@ -109,7 +109,7 @@ std::array<typename Lanes<D>::Answer, Lanes<D>::width> Lanes<D>::solve_alone(
   for (int i = 0; i < D * D; ++i) W[i] = spread(first.W + i, D * D);
   for (int i = 0; i < D; ++i) q[i] = spread(first.q + i, D);
   const Wide mu = spread(first.mu, 1);
-  Wide unread = Wide::Zero();  // NaN if the guess is not finite
+  Wide unread = Wide::Zero();  // NaN if the guess is not finite: a maximum may lose that
   // r = 0 if the contact opens, else the guess; a speed next to nothing is between them
   const Wide closing = (q[0] * (-1 / smallest_speed)).max(0.0).min(1.0);
   for (int i = 0; i < D; ++i) {

@@ -152,14 +152,14 @@ class Runner {
         }
       }
       const std::int64_t last = std::min(first + chunk, batch_.count);
-      for (std::int64_t k = first; k < last; ++k) {
-        try {
-          if (!solve_alone(k, place, outcome)) {
-            solve_one(k, one(k, place), memory, polls, outcome);
-          }
-        } catch (...) {
-          fail(k, std::current_exception());
+      if constexpr (Way::has_lanes) {
+        if (in_lanes()) {
+          solve_in_lanes(first, last, place, memory, polls, outcome);
+          continue;
         }
+      }
+      for (std::int64_t k = first; k < last; ++k) {
+        solve_one(k, place, memory, polls, outcome);
         advance(place, k);
       }
     }
@@ -212,23 +212,61 @@ class Runner {
     outcome.converged += status == Status::converged ? 1 : 0;
   }
 
-  /// Whether problem k is one contact that needs no more than a few steps: then it is answered.
-  [[nodiscard]] bool solve_alone(std::int64_t k, const Place& place, BatchOutcome& outcome) const {
-    if constexpr (!Way::alone) {
-      return false;
-    } else {
-      if (contacts(k) != 1 || batch_.M != nullptr || batch_.starts != nullptr) return false;
-      if (stopped_.load(std::memory_order_relaxed) >= 0) return false;
-      const auto at = [&](auto* array) { return array == nullptr ? nullptr : array + place.q; };
-      const auto solved =
-          Way::solve_alone(settings_.tolerance, batch_.W + place.W, at(batch_.q),
-                           batch_.mu[place.mu], at(batch_.guess), at(batch_.r), at(batch_.u));
-      if (solved) write(k, Status::converged, solved->first, solved->second, outcome);
-      return solved.has_value();
+  /// Whether each problem has a lane: they have the same few contacts, and W is dense.
+  [[nodiscard]] bool in_lanes() const {
+    return !varies() && batch_.M == nullptr && batch_.starts == nullptr && batch_.nc_each > 0 &&
+           batch_.nc_each <= Lanes<3>::most_contacts &&
+           stopped_.load(std::memory_order_relaxed) < 0;
+  }
+
+  /// Problems `first` to `last`; `place` is that of the first.
+  void solve_in_lanes(std::int64_t first, std::int64_t last, const Place& place, Way& way,
+                      bool polls, BatchOutcome& outcome) {
+    const std::int64_t m = std::int64_t{d_} * batch_.nc_each;
+    const auto from = [&](std::int64_t k) {
+      Place result = place;
+      result.W += k * m * m;
+      result.q += k * m;
+      result.mu += k * batch_.nc_each;
+      return result;
+    };
+    const auto arrays = [&](const Place& at) {
+      const auto start = [&](auto* array) { return array == nullptr ? nullptr : array + at.q; };
+      return LocalArrays{batch_.W + at.W,     batch_.q + at.q, batch_.mu + at.mu,
+                         start(batch_.guess), batch_.r + at.q, start(batch_.u)};
+    };
+    const auto answered = [&](std::int64_t k, const auto& answer) {
+      if (answer.solved) {
+        write(first + k, Status::converged, answer.error, answer.sweeps, outcome);
+      } else {
+        solve_one(first + k, from(k), way, polls, outcome, answer);
+      }
+    };
+    auto& lanes = way.lanes();
+    if (batch_.nc_each > 1) {
+      lanes.solve(settings_.tolerance, batch_.nc_each, last - first, arrays(place), answered);
+      return;
+    }
+    constexpr int width = Lanes<3>::width;
+    for (std::int64_t k = 0; k < last - first; k += width) {
+      const int count = static_cast<int>(std::min<std::int64_t>(width, last - first - k));
+      const auto answers = lanes.solve_alone(settings_.tolerance, count, arrays(from(k)));
+      for (int j = 0; j < count; ++j) answered(k + j, answers[static_cast<std::size_t>(j)]);
     }
   }
 
-  void solve_one(std::int64_t k, const One& one, Way& way, bool polls, BatchOutcome& outcome) {
+  /// `start` is what Lanes have begun.
+  void solve_one(std::int64_t k, const Place& place, Way& way, bool polls, BatchOutcome& outcome,
+                 const SweptStart& start = {}) {
+    try {
+      solve_one(k, one(k, place), way, polls, outcome, start);
+    } catch (...) {
+      fail(k, std::current_exception());
+    }
+  }
+
+  void solve_one(std::int64_t k, const One& one, Way& way, bool polls, BatchOutcome& outcome,
+                 const SweptStart& start) {
     const Index m = d_ * one.nc;
     const auto answer = [&](Status status, double error, std::int64_t iterations) {
       write(k, status, error, iterations, outcome);
@@ -245,7 +283,9 @@ class Runner {
       }
       return;
     }
-    if (one.guess != nullptr) {
+    if (start.started) {
+      way.start_behind(start);
+    } else if (one.guess != nullptr) {
       std::copy_n(one.guess, m, one.r);
     } else {
       std::fill_n(one.r, m, 0.0);

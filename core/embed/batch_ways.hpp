@@ -11,6 +11,7 @@
 
 #include "convert/complete.hpp"
 #include "embed/body_form.hpp"
+#include "embed/lanes.hpp"
 #include "embed/small_solver.hpp"
 #include "merit/merit.hpp"
 #include "problem.hpp"
@@ -121,12 +122,12 @@ class SmallWay {
     return wrong == nullptr ? std::string() : std::string("W: ") + wrong;
   }
 
-  /// One contact that needs no memory: as SmallSolver has it.
-  static constexpr bool alone = true;
-  static auto solve_alone(double tolerance, const double* W, const double* q, double mu,
-                          const double* guess, double* r, double* u) {
-    return SmallSolver<D>::solve_alone(tolerance, W, q, mu, guess, r, u);
-  }
+  /// Problems of few contacts are solved several at once.
+  static constexpr bool has_lanes = true;
+  Lanes<D>& lanes() { return lanes_; }
+
+  /// As SmallSolver::start_behind.
+  void start_behind(const SweptStart& start) { solver_.start_behind(start); }
 
   /// The merit's error of r, and u and v.
   double judge(const One& one) {
@@ -169,12 +170,14 @@ class SmallWay {
  private:
   SmallSolver<D> solver_;
   BodyForm<D> bodies_;
+  Lanes<D> lanes_;
 };
 
 /// Rolling and spin friction: `auto` for each.
 class WholeWay {
  public:
-  static constexpr bool alone = false;
+  static constexpr bool has_lanes = false;
+  void start_behind(const SweptStart&) {}
 
   std::string take(const One& one) {
     d_ = one.spacedim;

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "contact/alart_curnier.hpp"
 #include "contact/natural_squares.hpp"
 #include "embed/contact_judge.hpp"
 #include "embed/memory.hpp"
+#include "embed/rounding.hpp"
+#include "embed/sweep_rule.hpp"
 #include "linalg/extended.hpp"
 #include "merit/natural_sums.hpp"
 
@@ -17,7 +18,7 @@ namespace fclib {
 
 namespace {
 
-constexpr int most_sweeps = 500;
+constexpr int most_sweeps = SweepRule::most;
 constexpr int newton_attempts = 8;
 constexpr int newton_steps = 12;  // of the first attempt; later ones have more
 /// The rate of sweeps is trusted for so many sweeps ahead.
@@ -32,24 +33,6 @@ constexpr std::size_t few_contacts = 12;
 /// The largest problem that double precision judges. A row of W r + q has so many terms that its
 /// rounding is less than what the merit allows to a velocity (merit/equations).
 constexpr Index most_bounded = 32;
-/// A bound on the error is at most this part of the tolerance above the error.
-constexpr double bounded_excess = 1e-3;
-/// Roundings of the natural map of one contact, generously.
-constexpr double roundings_of_the_map = 40;
-/// Beyond these sizes squares in double precision may be lost, or be infinite.
-constexpr double smallest_size = 1e-100;
-constexpr double largest_size = 1e100;
-/// Sweeps of projections go on as long as no more of them are foreseen than cost as much as a few
-/// steps of Newton's method, within these bounds. They cost a half of exact ones or less, but more
-/// of them are needed, and if contacts are redundant very many.
-constexpr double least_projections = 20;
-constexpr double most_projections = 250;
-constexpr double few_newton_steps = 2;
-/// If a sweep changes r by less than so many tolerances, the end is near.
-constexpr double near_end = 100;
-/// A contact without others that so many steps do not solve has tangents that differ, or a normal
-/// that they change.
-constexpr int most_steps_alone = 2;
 /// A sweep solves each contact to this part of what the last sweep has changed, and of what the
 /// tolerance leaves to all.
 constexpr double closeness_to_change = 0.1;
@@ -114,9 +97,6 @@ inline void projected_step(double normal, double tangent, double mu, const doubl
   for (int i = 1; i < D; ++i) r[i] *= scale;
 }
 
-/// Whether squares of numbers of this size are safe in double precision.
-bool has_square(double size) { return size >= smallest_size && size <= largest_size; }
-
 /// Whether the error is above `aim` already, whatever is still to be added. ||q|| is `scale`, and
 /// ||rho q|| is `scaled_scale`.
 bool is_beyond(const NaturalSquares<double>& squares, double aim, double scale,
@@ -127,16 +107,15 @@ bool is_beyond(const NaturalSquares<double>& squares, double aim, double scale,
          squares.impulses > scaled_most * scaled_most;
 }
 
-/// The merit's error in double precision, and what rounding may have done to it. Of n numbers that
-/// are added, rounding changes the sum by at most n units of the sum of their sizes. The natural
-/// map changes by no more than u^, and that by at most 1 + mu times u.
+/// The merit's error in double precision, and what rounding may have done to it. The natural map
+/// changes by no more than u^, and that by at most 1 + mu times u.
 template <int D>
 class BoundedError {
  public:
   using Vec = ContactVector<D>;
 
   /// `mean` is at least the mean ||q^a||, for the slip that is rounding.
-  BoundedError(Index nc, double mean) : unit_(unit_of(nc)), mean_(mean) {}
+  BoundedError(Index nc, double mean) : unit_(unit_of_rounding<D>(nc)), mean_(mean) {}
 
   /// A contact with the velocity u, whose terms have the sizes `terms`.
   void add(double mu, const Vec& u, const Vec& terms, const Vec& r, double rho) {
@@ -164,10 +143,6 @@ class BoundedError {
         unit_ * error + larger_error(plain_ / scale, velocities_ / scale, impulses_ / scaled_scale);
     if (!(rounding <= bounded_excess * tolerance)) return std::numeric_limits<double>::infinity();
     return error + rounding;
-  }
-
-  static constexpr double unit_of(Index nc) {
-    return std::numeric_limits<double>::epsilon() * (D * nc + roundings_of_the_map);
   }
 
  private:
@@ -457,6 +432,7 @@ void SmallSolver<D>::prepare(const double* q, const double* mu) {
   q_ = q;
   mu_ = mu;
   iterations_ = 0;
+  swept_ = -1;
   in_u_ = false;
   contacts_.clear();
   double squares = 0;
@@ -592,76 +568,6 @@ bool SmallSolver<D>::meets(double tolerance, const double* r) {
   return squares.error(scale_, scaled_scale_) <= tolerance;
 }
 
-/// A contact alone, by the steps of projected_sweep(). Whatever is not finite makes the bound NaN.
-template <int D>
-std::optional<std::pair<double, std::int64_t>> SmallSolver<D>::solve_alone(
-    double tolerance, const double* W, const double* q, double mu, const double* guess, double* r,
-    double* u) {
-  double sizes = 0;
-  double most = 0;
-  double square = 0;
-  double unread = 0;  // NaN if the guess is not finite
-  double own[D] = {};
-  for (int i = 0; i < D; ++i) {
-    sizes += std::abs(W[(D + 1) * i]);
-    if (i > 0) most = std::max(most, W[(D + 1) * i]);
-    square += q[i] * q[i];
-    if (guess == nullptr) continue;
-    unread += guess[i] * 0.0;
-    if (!(q[0] >= 0)) own[i] = guess[i];
-  }
-  const double mean = sizes / D;
-  const double rho = 1 / mean;
-  const double scale = std::sqrt(square);
-  if (!(W[0] > 0 && most > 0 && mu >= 0 && unread == 0)) return {};
-  if (!(has_square(scale) && has_square(rho) && has_square(rho * scale))) return {};
-  const double over = 1 / scale;
-  const double normal = 1 / W[0];
-  const double tangent = 1 / most;
-  const Coulomb<D> cone(mu);
-  constexpr double unit = BoundedError<D>::unit_of(1);
-  for (int steps = 0;; ++steps) {
-    double velocity[D];
-    double sums = 0;  // of the squares of the sizes of its terms
-    double lengths = 0;
-    for (int i = 0; i < D; ++i) {
-      velocity[i] = q[i];
-      double terms = std::abs(q[i]);
-      for (int j = 0; j < D; ++j) {
-        const double product = W[D * i + j] * own[j];
-        velocity[i] += product;
-        terms += std::abs(product);
-      }
-      sums += terms * terms;
-      lengths += own[i] * own[i];
-    }
-    if (steps > 0 || q[0] >= 0) {
-      // as BoundedError has it; as an impulse the map is no more than as a velocity
-      Vec at, by;
-      for (int i = 0; i < D; ++i) {
-        at[i] = velocity[i];
-        by[i] = own[i];
-      }
-      NaturalSquares<double> squares;
-      squares.add_plain(cone, at, by);
-      squares.add_scaled(cone, at, by, rho);
-      const double size = std::sqrt(lengths);
-      const double terms = std::sqrt(sums) + scale + std::max(size, size * mean);
-      const double error = std::sqrt(larger_error(squares.plain, squares.velocities)) * over;
-      const double rounding = unit * (error + (1 + mu) * terms * over);
-      if (rounding <= bounded_excess * tolerance && error + rounding <= tolerance) {
-        for (int i = 0; i < D; ++i) {
-          r[i] = own[i];
-          if (u != nullptr) u[i] = velocity[i];
-        }
-        return std::pair(error + rounding, std::int64_t{steps});
-      }
-    }
-    if (steps == most_steps_alone) return {};
-    projected_step<D>(normal, tangent, mu, velocity, own);
-  }
-}
-
 /// (W r + q)_a without W_aa r_a. By components: r was just stored so, and loads of vectors stall.
 template <int D>
 typename SmallSolver<D>::Vec SmallSolver<D>::coupled(Index a, const double* r) const {
@@ -760,21 +666,12 @@ bool SmallSolver<D>::project(double tolerance, double* r, double& change) {
     if (!(block(0, 0) > 0) || !(most > 0)) return false;
     steps_[self] = {1 / block(0, 0), 1 / most, 1 / (rho_[self] * rho_[self])};
   }
-  // so many sweeps cost as much as a step of Newton's method, of which it takes some
-  const double step = newton_cost() / projected_cost();
-  const double worth = std::clamp(few_newton_steps * step, least_projections, most_projections);
+  const SweepRule rule(costs());
   double last = 0;
   for (int k = 1; k <= most_sweeps; ++k) {
     change = projected_sweep(r);
-    const bool looks = k % first_sweeps == 0;
-    if (change <= (looks ? 2 : 1) * tolerance && meets(tolerance, r)) return true;
-    if (!std::isfinite(change)) return false;
-    if (looks) {
-      const double rate = std::log(last / change);
-      const bool slow = !(rate > 0) || std::log(change / tolerance) > worth * rate;
-      // near the end a slow sweep or two say little
-      if (slow && (change > near_end * tolerance || k > 2 * step)) return false;
-    }
+    if (SweepRule::is_near(k, change, tolerance) && meets(tolerance, r)) return true;
+    if (!rule.goes_on(k, last, change, tolerance)) return false;
     last = change;
   }
   return false;
@@ -808,22 +705,6 @@ bool SmallSolver<D>::keep(double error, const double* r, double& best) {
 template <int D>
 void SmallSolver<D>::restore(double* r) const {
   for (const Index a : now_) part(r, a) = part(best_.data(), a);
-}
-
-/// The number of operations, roughly.
-template <int D>
-double SmallSolver<D>::sweep_cost() const {
-  const auto count = static_cast<double>(now_.size());
-  return 200.0 * count + 2.0 * D * D * static_cast<double>(blocks_now_);
-}
-template <int D>
-double SmallSolver<D>::projected_cost() const {
-  return 50.0 * static_cast<double>(now_.size()) + 2.0 * D * D * static_cast<double>(blocks_now_);
-}
-template <int D>
-double SmallSolver<D>::newton_cost() const {
-  const double n = D * static_cast<double>(now_.size());
-  return 2.0 / 3.0 * n * n * n + 6 * n * n + 2 * sweep_cost();
 }
 
 /// One step of Newton's method from r. Returns false if its system is singular.
@@ -946,8 +827,11 @@ bool SmallSolver<D>::solve_island(std::size_t k, double tolerance, double* r) {
 template <int D>
 bool SmallSolver<D>::seek(double tolerance, double* r) {
   solvable_ = true;
-  double change = 1;  // about the error of r = 0
-  if (project(tolerance, r, change)) return true;
+  double change = std::exchange(swept_, -1.0);
+  if (change < 0) {
+    change = 1;  // about the error of r = 0
+    if (project(tolerance, r, change)) return true;
+  }
   change = std::min(1.0, change);  // 1 if NaN
   if (contacts_.empty()) {
     for (Index a = 0; a < nc_; ++a) {
@@ -959,7 +843,7 @@ bool SmallSolver<D>::seek(double tolerance, double* r) {
   int attempts = 0;
   int next_attempt = first_sweeps;
   // sweeps; the rate tells little about many of them
-  const double worth = std::min(4 * newton_cost() / sweep_cost(), most_foreseen);
+  const double worth = std::min(4 * costs().newton / costs().exact, most_foreseen);
   const bool alone = now_.size() == 1;
   double close = closeness * tolerance;
   for (int k = 1; k <= most_sweeps; ++k) {

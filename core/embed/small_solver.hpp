@@ -16,15 +16,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "contact/coulomb.hpp"
 #include "contact/exact_contact.hpp"
 #include "contact/natural_squares.hpp"
 #include "embed/matrix_view.hpp"
+#include "embed/sweep_rule.hpp"
 
 namespace fclib {
 
@@ -79,14 +78,11 @@ class SmallSolver {
     }
   }
 
-  /// One contact, with W (D x D) by rows: r, u if it is not null, the error as `solve` has it, and
-  /// the steps. Nothing if a few steps do not solve it, or if something is not finite: then r and u
-  /// are as they were.
-  static std::optional<std::pair<double, std::int64_t>> solve_alone(double tolerance,
-                                                                    const double* W,
-                                                                    const double* q, double mu,
-                                                                    const double* guess, double* r,
-                                                                    double* u);
+  /// Says that the next solve starts from where projected sweeps ended. It makes no more of them.
+  void start_behind(const SweptStart& start) {
+    iterations_ += start.sweeps;
+    if (islands_ == 1) swept_ = start.change;
+  }
 
   /// Whether the last solve has left W r + q in `velocities()`, without `judge()`.
   [[nodiscard]] bool has_velocities() const { return in_u_; }
@@ -138,9 +134,7 @@ class SmallSolver {
   bool newton_step(double weight_of_mean, double* r);
   bool keep(double error, const double* r, double& best);
   void restore(double* r) const;
-  [[nodiscard]] double sweep_cost() const;
-  [[nodiscard]] double projected_cost() const;
-  [[nodiscard]] double newton_cost() const;
+  [[nodiscard]] StepCosts costs() const { return {D, now_.size(), blocks_now_}; }
 
   static Eigen::Map<const Vec> part(const double* x, Index a) {
     return Eigen::Map<const Vec>(x + D * a);
@@ -157,6 +151,7 @@ class SmallSolver {
   bool bounds_ = false;            // whether a bound on the error may do
   double bound_ = 0;               // of the last r that met the tolerance
   std::int64_t iterations_ = 0;
+  double swept_ = -1;  // the change of sweeps made elsewhere
   // W by blocks; the diagonal ones are apart
   std::vector<Mat> diagonal_, blocks_;
   std::vector<std::size_t> row_;  // where the blocks of each contact begin, and where they end

@@ -84,7 +84,7 @@ class Law:
         rolls, spins = self.mu_r is not None, self.mu_s is not None
         known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}
         fits = known.get((rolls, spins), (6,))
-        if not isinstance(spacedim, Integral) or spacedim not in fits:
+        if not isinstance(spacedim, (int, Integral)) or spacedim not in fits:
             given = [name for name in ("mu_r", "mu_s") if getattr(self, name) is not None]
             words = f"expected {' or '.join(map(str, fits))}"
             raise _core.ProblemError(
@@ -214,7 +214,7 @@ def solve_batch(
         )
     if pattern is not None and (jacobian is not None or W is None):
         raise _core.ProblemError("pattern: is for W, given by blocks")
-    masses = np.empty(0, dtype=bool)
+    masses: npt.NDArray[np.bool_] | None = None
     if jacobian is not None:
         W, q, masses = _of_bodies(spacedim, jacobian, inverse_mass, velocity, q, contacts)
     sizes: tuple[int, ...]
@@ -269,7 +269,8 @@ def solve_batch(
         given, spacedim, count, each, counts, offsets, sizes, friction, start, None, tol, threads,
         time_limit,
     )  # fmt: skip
-    for first in np.flatnonzero(~masses)[:1]:
+    if masses is not None and not masses.all():
+        first = np.argmin(masses)
         if result.wrong.startswith(f"problem {first}: W"):
             words = "is not symmetric, or negative, or not finite"
             result = replace(result, wrong=f"problem {first}: inverse_mass: {words}")
@@ -306,29 +307,17 @@ def run(
     status = np.empty(count, dtype=np.int32)
     error = np.empty(count)
     iterations = np.empty(count, dtype=np.int32)
-    names = ("W", "q", "starts", "columns", "n", "M", "H", "f", "w")
-    arrays: dict[str, Any] = {name: given.get(name) for name in names}
+    get = given.get
     try:
+        # by their places: for one small problem, names would take as long as its solution
         by_auto, first, wrong = _core.solve_batch(
-            spacedim=spacedim,
-            count=count,
-            each=each,
-            nc=counts,
-            one_pattern=given.get("one_pattern", False),
-            n_each=given.get("n_each", 0),
-            **arrays,
-            **friction,
-            guess=None if guess is None else guess.reshape(-1),
-            r=r.reshape(-1),
-            u=u.reshape(-1),
-            v=None if v is None else v.reshape(-1),
-            status=status,
-            error=error,
-            iterations=iterations,
-            tolerance=tol,
-            threads=threads,
-            time_limit=math.inf if time_limit is None else time_limit,
-        )
+            spacedim, count, each, counts, get("W"), get("q"), get("starts"), get("columns"),
+            get("one_pattern", False), get("n_each", 0), get("n"), get("M"), get("H"), get("f"),
+            get("w"), friction["mu"], friction["mu_r"], friction["mu_s"], friction["coupled"],
+            None if guess is None else guess.reshape(-1), r.reshape(-1), u.reshape(-1),
+            None if v is None else v.reshape(-1), status, error, iterations, tol, threads,
+            math.inf if time_limit is None else time_limit,
+        )  # fmt: skip
     except TypeError:
         name_wrong_type(tol=tol, threads=threads, time_limit=time_limit)
         raise
@@ -488,6 +477,8 @@ def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
 
 def broadcast(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
     array = floats(name, values)
+    if array.shape == shape:
+        return array
     try:
         return np.ascontiguousarray(np.broadcast_to(array, shape))
     except ValueError:

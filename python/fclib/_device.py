@@ -90,7 +90,9 @@ def on_device(*arrays: Any) -> bool:
 
 
 def _is_device(array: Any) -> bool:
-    if isinstance(array, (list, tuple, float, int)) or array is None:
+    if type(array) is np.ndarray or array is None:
+        return False
+    if isinstance(array, (list, tuple, float, int)):
         return False
     if hasattr(type(array), "__dlpack_device__"):
         return bool(array.__dlpack_device__()[0] == CUDA_DEVICE)

@@ -138,13 +138,14 @@ CONSTANTS = [
     varied("second_cap", "jammed", 0.9, 0.6),  # half and double of what is left of it
     varied("most_moving", "crowded", 0.5, 0.8, 1),
     *(
-        varied(name, "batches", source="embed/small_solver.cpp")
-        for name in (
-            "least_projections",
-            "most_projections",
-            "few_newton_steps",
-            "near_end",
-            "most_steps_alone",
+        varied(name, "batches", source=f"embed/{source}.cpp")
+        for name, source in (
+            ("least_projections", "sweep_rule"),
+            ("most_projections", "sweep_rule"),
+            ("few_newton_steps", "sweep_rule"),
+            ("near_end", "sweep_rule"),
+            ("part_of_sweep", "lanes"),
+            ("most_steps_alone", "lanes"),
         )
     ),
 ]

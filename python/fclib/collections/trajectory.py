@@ -309,7 +309,9 @@ def states_of(trajectory: Trajectory) -> tuple[dict[str, bytes], dict[str, Any]]
     """The states and contacts of a trajectory as bytes, and the shapes of their arrays."""
     arrays: dict[str, bytes] = {}
     shapes: dict[str, Any] = {}
-    columns = [(name, getattr(trajectory, name), ORDERS) for name in ("position", "velocity")]
+    columns: list[tuple[str, Vector, tuple[int, ...]]] = [
+        (name, getattr(trajectory, name), ORDERS) for name in ("position", "velocity")
+    ]
     if trajectory.handed is not None:
         # contacts that follow each other are no steps
         columns += [(name, getattr(trajectory.handed, name), (0,)) for name in NUMBERS]
@@ -362,7 +364,7 @@ def read_origin(path: Path) -> tuple[Scene, dict[str, Any]]:
 
 def source_of(path: Path, head: Mapping[str, Any]) -> Path:
     """The file with the states of one that has none. Raises TrajectoryError if it is not there."""
-    source = path.parents[1] / head["source"]
+    source: Path = path.parents[1] / head["source"]
     if not source.is_file():
         raise TrajectoryError(f"{path}: its states are in {source}, which is not there")
     return source

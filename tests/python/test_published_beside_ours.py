@@ -62,10 +62,10 @@ def test_ours_stand_under_the_published_files(
     second = [row[:2] for row in rows].index(["set", "of"])
     # the figures of the set, and ours under them; then sets that nothing of ours is beside
     shown = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[2:second]}
-    first = [row[0] for row in rows[:second]]
+    names = [row[0] for row in rows[:second]]
     # the report has this set too
     for name in (PUBLISHED, f"{PUBLISHED} (RT-0444)"):
-        assert first[first.index(f"*{name}*") + 1] == "rt444/BoxesStack"
+        assert names[names.index(f"*{name}*") + 1] == "rt444/BoxesStack"
     assert shown[f"*{PUBLISHED}*"]["dof"] == "6 to 300"
     assert shown["rt444/BoxesStack"]["problems"] == "5"
     assert "contacts" in shown["rt444/BoxesStack"]["within"]

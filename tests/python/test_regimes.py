@@ -19,6 +19,7 @@ from fclib.scenes.local_problems import ChuteLocalProblems
 pytest.importorskip("mujoco")
 pytest.importorskip("skfem")
 
+from fclib.simulate.rounding import PER_SIZE
 from workshop.sets import collection_table as table
 from workshop.sets import regimes
 
@@ -186,5 +187,5 @@ def test_a_sphere_has_the_same_problem_in_the_frame_of_the_world() -> None:
     difference = np.abs((first.W - second.W).toarray()).max()
     assert difference < 1e-6 * np.abs(first.W.toarray()).max()
     # a point of the surface moves by less than a quantum of places in a step
-    assert np.abs(first.q - second.q).max() * scheme.h < 2.0**regimes.PER_SIZE * size
+    assert np.abs(first.q - second.q).max() * scheme.h < 2.0**PER_SIZE * size
     assert (state[0].reshape(-1, 7)[:, 3:] == (1, 0, 0, 0)).all()

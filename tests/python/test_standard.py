@@ -428,7 +428,7 @@ def test_chosen_states_are_stored_once(tmp_path: Path) -> None:
     assert again.origin == part.origin
     assert again.digest == part.digest
     assert again.guess[0] is None
-    assert again.guess[1].tolist() == [1, 1, 1]
+    assert np.array_equal(np.asarray(again.guess[1]), np.ones(3))
     for name in ("number", "step", "position", "velocity", "sketch"):
         np.testing.assert_array_equal(getattr(again, name), getattr(part, name))
     assert fclib.digest(again.problem(1).problem) == part.digest[1]

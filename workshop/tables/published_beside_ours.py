@@ -153,7 +153,11 @@ def beside(ours: dict[str, Any], sample: int, limit: int) -> list[dict[str, str]
     """The rows of the sets, each with ours under it; families without a set come last."""
     table, left = [], dict(ours)
     # some of ours stand under several sets
-    spectra = functools.cache(lambda name: collection_table.spectra(*ours[name], sample, limit))
+
+    @functools.cache
+    def spectra(name: str) -> list[Any]:
+        folder, rows = ours[name]
+        return collection_table.spectra(folder, rows, sample, limit)
 
     def row(name: str, published: dict[str, str] | None = None) -> dict[str, str]:
         rows, figures = ours[name][1], spectra(name)

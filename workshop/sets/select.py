@@ -37,7 +37,7 @@ import numpy.typing as npt
 from fclib import _digest, _solve
 from fclib._files import write_text
 from fclib._judge import TOLERANCE, trivial
-from fclib.collections import catalog, published, ratings, trajectory
+from fclib.collections import catalog, ratings, trajectory
 from fclib.collections.build import facts_of, guess_for, item_of
 from fclib.collections.set_index import Choice
 from workshop.sets import features
@@ -669,9 +669,9 @@ def publish(
     version: str,
     folder: Path,
 ) -> list[Path]:
-    """Store the states of chosen problems as those of a set, or where they are stored already.
+    """Store the states of chosen problems as those of a set.
 
-    A family whose problems are stored already, in any version, is left as it is. Raises OSError.
+    States that a file of the folder has already are stored in that file only. A family whose problems are stored already, in any version, is left as it is. Raises OSError.
     """
     written = []
     for found in sources.values():
@@ -688,7 +688,10 @@ def publish(
             )
         part = trajectory.part(found.states, own, name, version)
         guessed = replace(part, guess=guesses_of(found, sorted(own)))
-        trajectory.write(target, guessed, source=published.name_of(found.plan.trajectory))
+        file = found.plan.trajectory
+        shared = file is not None and file.is_relative_to(folder)
+        source = file.relative_to(folder).as_posix() if file is not None and shared else ""
+        trajectory.write(target, guessed, source)
         written.append(target)
     return written
 

@@ -63,14 +63,6 @@ def file_name(folder: str, version: str) -> str:
     return f"{folder}-{version}{trajectory.SUFFIX}"
 
 
-def name_of(path: Path | None) -> str:
-    """SET/FAMILY-VERSION.trajectory of a published file; empty for another one, or for none."""
-    base = root()
-    if path is None or base is None or not path.is_relative_to(base):
-        return ""
-    return path.relative_to(base).as_posix()
-
-
 def digests(folder: str, version: str) -> dict[int, str]:
     """The digest of each problem of a version of SET/FAMILY; empty if it is not stored here."""
     path = path_of(folder, version)

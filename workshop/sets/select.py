@@ -671,7 +671,8 @@ def publish(
 ) -> list[Path]:
     """Store the states of chosen problems as those of a set.
 
-    States that a file of the folder has already are stored in that file only. A family whose problems are stored already, in any version, is left as it is. Raises OSError.
+    States that a file of the folder has already are stored in that file only. A family whose
+    problems are stored already, in any version, is left as it is. Raises OSError.
     """
     written = []
     for found in sources.values():

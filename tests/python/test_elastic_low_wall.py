@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.optimize
 
 from fclib import scenes
 from fclib.collections import published, trajectory
 from helpers import dense
+from helpers_elastic import directions_and_gaps, masses, stiffness
 
 pytest.importorskip("mujoco")
 
@@ -63,19 +63,6 @@ def at(contacts: Any, height: float) -> Any:
     return flat & (np.abs(contacts.point[:, 2] - height) < 0.01)
 
 
-def masses(scene: Any) -> Any:
-    """An eighth of each element's mass to each of its nodes (n)."""
-    found = []
-    for mesh in scene.solids.meshes:
-        x = np.array(mesh.nodes)
-        own = np.zeros(len(x))
-        for element in mesh.elements:
-            edges = np.ptp(x[list(element)], axis=0)
-            own[list(element)] += mesh.density * edges.prod() / 8
-        found.append(np.repeat(own, 3))
-    return np.concatenate(found)
-
-
 # ---- the facts of the deck
 
 
@@ -119,34 +106,6 @@ def test_stored_problems_are_as_large_as_published() -> None:
 # ---- M, H, f and w
 
 
-def foot(point: Any, corners: Any) -> tuple[Any, Any, float]:
-    """The weights (4) of a bilinear face's corners below a point or at the edge, and the gap.
-
-    Also the largest local coordinate below the point: more than 1 is beyond the edge.
-    """
-
-    def shape(a: float, b: float) -> Any:
-        return (
-            np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)])
-            / 4
-        )
-
-    def normal(a: float, b: float) -> Any:
-        along = np.array([b - 1, 1 - b, 1 + b, -1 - b]) / 4 @ corners
-        across = np.array([a - 1, -1 - a, 1 + a, 1 - a]) / 4 @ corners
-        out = np.cross(along, across)
-        return out / np.linalg.norm(out)
-
-    def off(x: Any) -> Any:
-        return shape(x[0], x[1]) @ corners + x[2] * normal(x[0], x[1]) - point
-
-    found = scipy.optimize.root(off, np.zeros(3), tol=1e-13)
-    outside = np.abs(found.x[:2]).max()
-    a, b = found.x[:2].clip(-1, 1)
-    gap = normal(a, b) @ (point - shape(a, b) @ corners)
-    return shape(a, b), gap, outside
-
-
 def test_problems_are_rebuilt_by_numpy() -> None:
     own = family(**FAST)
     scene = own.scene(0)
@@ -160,7 +119,7 @@ def test_problems_are_rebuilt_by_numpy() -> None:
     x = np.concatenate([mesh.nodes for mesh in scene.solids.meshes]) + u.reshape(-1, 3)
 
     n = len(u)
-    M, K = masses(scene), model.K.toarray()
+    M, K = masses(scene), stiffness(scene)
     plate, floor = n - 48, n - 24  # first degrees of freedom of both
     given = np.zeros(n, dtype=bool)
     given[plate:floor:3] = given[floor:] = True
@@ -172,28 +131,10 @@ def test_problems_are_rebuilt_by_numpy() -> None:
     effective = np.diag(M) + H**2 * THETA**2 * K
     f = M * before - H**2 * THETA * (1 - THETA) * (K @ before) + H * force - effective @ later
 
-    first = np.concatenate(([0], np.cumsum([len(mesh.nodes) for mesh in scene.solids.meshes])))
-    directions = np.zeros((n, 3 * len(contacts)))
-    gaps, mu = [], []
-    for c, (master, slave) in enumerate(contacts.pair.tolist()):
-        mesh = scene.solids.meshes[master - 1]
-        best = None
-        for surface in mesh.surfaces:
-            if surface.candidate:
-                continue
-            for quad in surface.quads:
-                nodes = first[master - 1] + np.array(quad)
-                weights, gap, outside = foot(x[slave], x[nodes])
-                if abs(gap) < 0.01 and (best is None or outside < best[0] - 1e-9):
-                    best = (outside, nodes, weights, gap)
-        assert best is not None
-        outside, nodes, weights, gap = best
-        assert outside < 1 + 1e-3
-        for node, share in ((slave, 1.0), *zip(nodes, -weights, strict=True)):
-            directions[3 * node : 3 * node + 3, 3 * c : 3 * c + 3] += share * contacts.frame[c].T
-        gaps.append(gap)
-        mu.append(0.83 if scene.solids.meshes[master - 1].density > 1e5 else 0.53)
-    middle = np.array(gaps) + (1 - THETA) * H * (directions.T @ before)[0::3]
+    directions, gaps = directions_and_gaps(scene, x, contacts, near=0.01)
+    heavy = [scene.solids.meshes[k - 1].density > 1e5 for k in contacts.pair[:, 0].tolist()]
+    mu = np.where(heavy, 0.83, 0.53)
+    middle = gaps + (1 - THETA) * H * (directions.T @ before)[0::3]
     w = directions.T @ later
     w[0::3] += middle / H
 

@@ -43,6 +43,7 @@ FOLDERS = (
     large("rr9118/Chute1000"),
     large("rr9118/Chute4000"),
     large("decks/SpheresInPlates"),
+    "decks/ShakenCell",
 )
 
 
@@ -62,12 +63,14 @@ def crossing(vectors: Any) -> Any:
     return np.cross(vectors[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)
 
 
-def in_problem(problem: Any) -> Any:
+def in_problem(problem: Any, driven: bool) -> Any:
     """The bodies of a problem with six coordinates: all that move, or those with a contact.
 
-    The last one may be a plate on a slider, with one coordinate.
+    The last one may be a plate on a slider, with one coordinate. Driven ones have coordinates too.
     """
     moving = np.flatnonzero(problem.bodies.moves)
+    if driven:
+        return moving
     count, plates = divmod(problem.n, 6)
     assert plates <= 1
     if len(moving) != count + plates:
@@ -76,14 +79,14 @@ def in_problem(problem: Any) -> Any:
     return moving[:count]
 
 
-def directions(problem: Any) -> Any:
-    """H: u is the velocity of the second body at the point, less the first's.
+def directions(problem: Any, which: Any) -> Any:
+    """H of some bodies: u is the velocity of the second body at the point, less the first's.
 
     Rolling has two more rows: the spins about both tangents, as a velocity is their product with
     the normal or not.
     """
     contacts, bodies = problem.contacts, problem.bodies
-    which, d = in_problem(problem), problem.m // problem.nc
+    d = problem.m // problem.nc
     place = np.full(len(bodies.moves), -1)
     place[which] = np.arange(len(which))
     frame = np.stack(
@@ -131,15 +134,21 @@ def test_problems_are_rebuilt_from_their_tables(folder: str) -> None:
     places = np.unique(np.linspace(0, len(states) - 1, COUNT).round().astype(int))
     assert len(places) == COUNT
     for place in places.tolist():
-        problem: Any = states.problem(place).problem
-        bodies, which = problem.bodies, in_problem(problem)
+        part: Any = states.problem(place)
+        problem = part.problem
+        bodies, contacts = problem.bodies, problem.contacts
+        which = in_problem(problem, bool(scene.drives))
         n = 6 * len(which)
-        H = directions(problem)
-        assert largest(H - problem.H[:n]) <= EXACT * max(1.0, largest(H))
+        free = part.dofs if scene.drives else np.arange(n)
+        H = directions(problem, which)
+        assert largest(H[free] - problem.H[: len(free)]) <= EXACT * max(1.0, largest(H))
 
         axes = rotations(bodies.axes[which])
         inertia = axes @ (bodies.inertia[which][:, :, None] * axes.transpose(0, 2, 1))
-        mass, twist = bodies.mass[which], bodies.velocity[:n].reshape(-1, 6)
+        mass = bodies.mass[which]
+        # the file has no velocities of driven bodies
+        v = states.velocity[place] if scene.drives else bodies.velocity
+        twist = v[:n].reshape(-1, 6)
         omega = twist[:, 3:]
         momentum = np.einsum("bij,bj->bi", inertia, omega)
         blocks = np.zeros((len(which), 6, 6))
@@ -150,23 +159,29 @@ def test_problems_are_rebuilt_from_their_tables(folder: str) -> None:
             change = crossing(omega) @ inertia - crossing(momentum)
             blocks[:, 3:, 3:] += h * scene.theta * change
         M = sp.block_diag(list(blocks), format="csc")
-        assert largest(M - problem.M[:n, :n]) <= EXACT * largest(M)
+        k = len(free)
+        assert largest(M[free][:, free] - problem.M[:k, :k]) <= EXACT * largest(M)
 
         gravity = GRAVITY["own"] if states.handed is None else GRAVITY["handed"]
         pushed = np.zeros_like(twist)
         pushed[:, 2] = -h * mass * scene.parameters.get("gravity", gravity)
         pushed[:, 3:] = -h * np.cross(omega, momentum)
-        f = M @ twist.ravel() + pushed.ravel()
-        assert largest(f - problem.f[:n]) <= EXACT * largest(f)
+        f = (M @ twist.ravel() + pushed.ravel())[free]
+        assert largest(f - problem.f[:k]) <= EXACT * largest(f)
 
-        w = np.zeros((problem.nc, problem.m // problem.nc))
+        later = np.zeros(n)
+        for drive in scene.drives:
+            assert drive.velocity
+            later[drive.dof] = drive.course.at(states.time(place) + h)
+        w = (H.T @ later).reshape(problem.nc, -1)
         if scene.law == "gap":
-            speed = (problem.H.T @ bodies.velocity).reshape(w.shape)[:, 0]
-            middle = problem.contacts.gap + (1 - scene.theta) * h * speed
-            # the law of the deck undoes no penetration
+            # a plate on a slider is in H of the problem only
+            before = H.T @ v if scene.drives else problem.H.T @ v
+            middle = contacts.gap + (1 - scene.theta) * h * before.reshape(w.shape)[:, 0]
+            # the law of the decks undoes no penetration
             assert {one.law for one in scene.interactions} <= {"IQS_CLB"}
             undone = 0.0 if scene.interactions else states.origin["settings"]["stabilization"]
-            w[:, 0] = np.where(middle > 0, 1.0, undone) * middle / h
+            w[:, 0] += np.where(middle > 0, 1.0, undone) * middle / h
         else:
             assert scene.restitution == 0
         # w has gaps by the time step

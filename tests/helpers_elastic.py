@@ -102,7 +102,11 @@ def directions_and_gaps(scene: Any, x: Any, contacts: Any, near: float) -> tuple
                 continue
             for quad in surface.quads:
                 nodes = first[master - 1] + np.array(quad)
-                weights, gap, outside = foot(x[slave], x[nodes])
+                corners = x[nodes]
+                away = np.abs(x[slave] - corners.mean(axis=0)).max()
+                if away > np.ptp(corners, axis=0).max() + near:
+                    continue
+                weights, gap, outside = foot(x[slave], corners)
                 if abs(gap) < near and (best is None or outside < best[0] - 1e-9):
                     best = (outside, nodes, weights, gap)
         assert best is not None

@@ -49,7 +49,7 @@ from workshop.sets import collection_table
 Vector: TypeAlias = npt.NDArray[np.float64]
 States: TypeAlias = tuple[Vector, Vector]  # a position and a velocity
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
-DEEPEST = 0.02
+DEEPEST = 0.02  # [1] most regimes keep no state that is deeper
 SET = "rr9118"  # of the problems of one contact
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 WAY = Simulation(solver="nsgs", tol=1e-3, options={"max_iterations": 100})

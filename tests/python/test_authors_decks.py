@@ -13,7 +13,6 @@ from fclib import scenes
 from fclib.collections import published, trajectory
 from fclib.scenes.shared import recorded
 from helpers import dense
-from helpers_elastic import directions_and_gaps, masses, stiffness
 
 SIMULATED = (
     "ElasticCubes",
@@ -85,39 +84,6 @@ def test_rigid_problems_are_rebuilt_from_their_tables(name: str, begin: int) -> 
         np.testing.assert_allclose(dense(problem.H), H[:n], atol=1e-7)
         M = dense(problem.M)
         np.testing.assert_array_equal(M, np.diag(np.diag(M)))
-
-
-@pytest.mark.parametrize("name", ["ElasticCubesx2", "ElasticCubes"])
-def test_elastic_problems_are_rebuilt_from_their_states(name: str) -> None:
-    pytest.importorskip("mujoco")
-    path = published.path_of(f"decks/{name}", "1")
-    if path is None:
-        pytest.skip("no states of it are stored")
-    states = trajectory.read(path)
-    scene, h, theta = states.scene, states.time_step, states.scene.theta
-    assert scene.solids is not None
-    mass, K = masses(scene), stiffness(scene)
-    nodes = np.concatenate([np.array(mesh.nodes) for mesh in scene.solids.meshes])
-    free = np.ones(len(mass), dtype=bool)
-    free[[drive.dof for drive in scene.drives]] = False
-    M = np.diag(mass) + (h * theta) ** 2 * K
-    places = np.unique(np.linspace(0, len(states) - 1, 10).round().astype(int))
-    assert len(places) == 10
-    for place in places.tolist():
-        part: Any = states.problem(place)
-        problem, v = part.problem, states.velocity[place]
-        u = states.position[place][: len(mass)]
-        weight = np.where(np.arange(len(mass)) % 3 == 2, -9.81 * mass, 0.0)
-        force = weight - K @ u
-        f = mass * v - h**2 * theta * (1 - theta) * (K @ v) + h * force
-        H, gaps = directions_and_gaps(scene, nodes + u.reshape(-1, 3), part.contacts, near=0.1)
-        w = np.zeros(problem.m)
-        w[0::3] = gaps / h + (1 - theta) * (H.T @ v)[0::3]
-        atol = 1e-8
-        np.testing.assert_allclose(dense(problem.M), M[np.ix_(free, free)], atol=atol * M.max())
-        np.testing.assert_allclose(dense(problem.H), H[free], atol=atol)
-        np.testing.assert_allclose(problem.f, f[free], atol=atol * np.abs(f).max())
-        np.testing.assert_allclose(problem.w, w, atol=atol * max(1.0, np.abs(w).max()))
 
 
 def test_the_bridge_is_that_of_the_engine() -> None:

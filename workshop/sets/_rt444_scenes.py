@@ -1,4 +1,6 @@
-"""The scenes of RT-0444 by the authors' own scripts, in m, kg and s; for any interpreter.
+"""Scenes by the authors' own scripts, in m, kg and s: RT-0444's and the spheres of 2024.
+
+For any interpreter.
 
 The numbers are those of the data files of the repository FrictionalContactLibrary/fclib-scripts, as
 the rules that make them. The files do not have inertias: here they are those of homogeneous bodies.
@@ -6,7 +8,9 @@ the rules that make them. The files do not have inertias: here they are those of
 
 from __future__ import annotations
 
+import itertools
 import math
+import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -20,7 +24,7 @@ class Body:
     """A body, at the start; without mass it is fixed."""
 
     name: str
-    kind: str  # box: three edges; capsule: radius, and length of its cylinder, along y
+    kind: str  # box: three edges; sphere: radius; capsule: also length of its cylinder, along y
     sizes: tuple[float, ...]
     place: tuple[float, float, float]
     turn: tuple[float, ...] = UPRIGHT  # quaternion w, x, y, z
@@ -33,6 +37,9 @@ class Body:
         if self.kind == "box":
             x, y, z = (edge * edge * self.mass / 12 for edge in self.sizes)
             return y + z, x + z, x + y
+        if self.kind == "sphere":
+            moment = 0.4 * self.mass * self.sizes[0] ** 2
+            return moment, moment, moment
         radius, height = self.sizes
         # a cylinder and two half balls of one density
         ball = 4 * radius / (3 * height + 4 * radius) * self.mass
@@ -95,16 +102,33 @@ def planks() -> list[Body]:
     return found
 
 
-def capsules() -> list[Body]:
-    """100 capsules above each other, in an open box: each drops on the heap below."""
+def walled() -> list[Body]:
+    """The ground, and four walls around a square."""
     found = [ground()]
     for i in range(4):
         angle = math.pi / 2 * i
         place = 20.0 * math.cos(angle), 20.0 * math.sin(angle), 5.0
         found.append(Body(f"wall{i}", "box", (1.0, 10.0, 40.0), place, turned(angle, QUARTER)))
+    return found
+
+
+def capsules() -> list[Body]:
+    """100 capsules above each other, in an open box: each drops on the heap below."""
+    found = walled()
     for k in range(100):
         place = 0.0, 0.0, 6.0 * k + 20.0
         found.append(Body(f"capsule{k:02d}", "capsule", (1.0, 3.0), place, QUARTER, mass=1.0))
+    return found
+
+
+def spheres() -> list[Body]:
+    """20 layers of 10 x 10 spheres, a little out of their rows, that fall into an open box."""
+    found = walled()
+    drawn = random.Random(0)
+    for layer, x, y in itertools.product(range(20), range(10), range(10)):
+        aside = drawn.uniform(0, 0.1), drawn.uniform(0, 0.1)
+        place = 10.0 - 2.0 * x + aside[0], 10.0 - 2.0 * y + aside[1], 2.0 * layer + 5.0
+        found.append(Body(f"sphere{layer:02d}.{x}.{y}", "sphere", (0.7,), place, mass=1.0))
     return found
 
 
@@ -112,4 +136,5 @@ SCENES: Final = {
     "BoxesStack": Scene("BoxesStack", boxes, 0.7, 0.51, 10.0, 0.2),
     "KaplasTower": Scene("Kaplas", planks, 0.3, 0.50001, 10.0, 0.05),
     "Capsules": Scene("Capsules", capsules, 0.7, 0.50001, 30.0, 0.02),
+    "Spheres": Scene("Spheres", spheres, 0.7, 0.50001, 30.0, 0.02),
 }

@@ -27,7 +27,7 @@ from _rt444_scenes import SCENES, Body  # type: ignore[import-not-found]
 from siconos.mechanics.collision.bullet import SiconosBulletOptions
 from siconos.mechanics.collision.tools import Contactor
 
-KINDS = {"box": "Box", "capsule": "Capsule"}
+KINDS = {"box": "Box", "capsule": "Capsule", "sphere": "Sphere"}
 
 
 def solved_by(connection: Any) -> Any:

@@ -11,6 +11,8 @@ tenth, as collection_table.py compares them; the steps are then spread by each f
 regime that is as long as published is filled up to the published number by further steps, evenly
 spread in time. A simulation made again is another one in its last digits, and in the end in all of
 them. So a regime that grows keeps the states that are stored, and takes further steps beside them.
+One in time has all its steps evenly spread in time, and of the stored states those whose problems a
+chosen set has.
 
 States in which a body is deeper in another than its regime allows are left out.
 
@@ -35,6 +37,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 import fclib
@@ -51,6 +54,7 @@ States: TypeAlias = tuple[Vector, Vector]  # a position and a velocity
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
 DEEPEST = 0.02  # [1] most regimes keep no state that is deeper
 SET = "rr9118"  # of the problems of one contact
+CHOSEN = ("standard", "hard", "open")  # sets of chosen problems, which do not change
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 WAY = Simulation(solver="nsgs", tol=1e-3, options={"max_iterations": 100})
 EXACT = Simulation(solver="auto", tol=1e-8)
@@ -69,6 +73,7 @@ class Regime:
     by: tuple[str, ...] = ()  # columns of published_sets.csv that choose beside the contacts
     fill: bool = False  # to as many problems as published
     grows: bool = False  # the states of the newest stored version stay, and others join them
+    in_time: bool = False  # as many as published, evenly spread in time, whatever their contacts
     every: int = 1  # of so many steps one is looked at
     version: str = "1"  # of the trajectory
     collection: str = "rr9118"  # the set
@@ -241,10 +246,10 @@ REGIMES: dict[str, Regime] = {
     "SpheresInPlates": Regime(
         "945_SP_Box_PL",
         {},
-        keep=20,
-        steps=500,
+        keep=60,
+        steps=501,
         deepest=0.2,
-        grows=True,
+        in_time=True,
         spheres=True,
         collection="decks",
     ),
@@ -443,19 +448,45 @@ def chosen(found: list[Row], regime: Regime, there: int = 0) -> list[Row]:
     return [inside[place] for place in sorted(kept)]
 
 
+def in_time(found: list[Row], stored: list[Row], stays: set[int], count: int) -> list[Row]:
+    """So many steps, evenly spread, as they are stored if they are.
+
+    Stored ones with the numbers `stays` are taken, each in the place of a step near to it.
+    """
+    known = {row.number: row for row in stored}
+    places = [found[k] for k in evenly(len(found), count)]
+    old = sorted(stays)
+    apart = [[abs(number - row.number) for row in places] for number in old]
+    for k, place in zip(*linear_sum_assignment(np.reshape(apart, (len(old), -1))), strict=True):
+        places[place] = known[old[k]]
+    return sorted((known.get(row.number, row) for row in places), key=lambda row: row.number)
+
+
+def in_sets(states: trajectory.Trajectory) -> set[int]:
+    """The numbers of the states whose problems a chosen set has."""
+    digests = {choice.digest for name in CHOSEN for choice in set_index.choices(name)}
+    return {
+        int(number)
+        for number, digest in zip(states.number, states.digest, strict=True)
+        if digest in digests
+    }
+
+
 def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     """Write the trajectory of a regime; the problems that were chosen."""
     own, folder = regime.collection, f"{regime.collection}/{name}"
     family = scenes.get(regime.scene or name)(**regime.parameters)
     # a stored scene, as a scene made again may differ in its last digits
-    scene = newest(folder).scene if regime.grows else family.scene(0)
+    known = newest(folder) if regime.grows or regime.in_time else None
+    scene = known.scene if known else family.scene(0)
     found = list(rows(name, regime, scene))
-    stays: list[Row] = []
-    if regime.grows:
-        stays = list(rows(name, replace(regime, states=folder), scene))
+    stays = list(rows(name, replace(regime, states=folder), scene)) if known else []
+    if known and regime.in_time:
+        kept = in_time(found, stays, in_sets(known), regime.keep)
+    else:
         taken = {row.number for row in stays}
         found = [row for row in found if row.number not in taken]
-    kept = sorted(stays + chosen(found, regime, len(stays)), key=lambda row: row.number)
+        kept = sorted(stays + chosen(found, regime, len(stays)), key=lambda row: row.number)
     model = model_of(scene)
     scheme = scheme_of(model)
     exponent = trajectory.exponent_of(model)

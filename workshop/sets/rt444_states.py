@@ -16,7 +16,7 @@ choose      of these the steps on which nsgs takes more than LEAST sweeps, as th
             as many as the report has, evenly spread from a place that the seed draws
 
 A step whose poses, velocities and contacts do not give Siconos' own W is left out, and one whose
-bodies are deep in each other.
+bodies are deep in each other. Spheres is only simulated; it is no scene of the report.
 """
 
 from __future__ import annotations
@@ -428,8 +428,8 @@ def choose(name: str, folder: Path, out: Path, version: str, count: int) -> Path
 
 def status(states: Path) -> None:
     """How far each scene is."""
-    for name, scene in SCENES.items():
-        folder = states / name
+    for name in PROBLEMS:
+        scene, folder = SCENES[name], states / name
         found = files(folder)
         print(
             f"{name}: {max(found, default=0) * scene.step:.2f} of {scene.end:g} s,"
@@ -456,6 +456,8 @@ def main() -> None:
         return status(own.states)
     if own.scene is None or (own.command == "choose" and own.out is None):
         parser.error("name a scene, and a folder for choose (--out)")
+    if own.command != "simulate" and own.scene not in PROBLEMS:
+        parser.error(f"{own.scene} is only simulated: it is no scene of the report")
     folder = own.states / own.scene
     if own.command == "simulate":
         simulate(own.scene, folder, own.every, own.end or SCENES[own.scene].end)

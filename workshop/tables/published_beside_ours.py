@@ -2,7 +2,7 @@
 
     .venv/bin/python -m workshop.tables.published_beside_ours FOLDER... [--files FILES.csv]
         [--sample 32] [--limit 1900] [--most 200000] [--seconds 20] [--pictures OUT]
-        [--results NAME]
+        [--results NAME] [--only SET/FAMILY...]
     .venv/bin/python -m workshop.tables.published_beside_ours FOLDER... --report OUT
 
 The first table has the ends of sizes, density, rank ratio and conditioning of each published set
@@ -16,6 +16,8 @@ are those of all problems of a catalogue. Sweeps are those of our nsgs to TOLERA
 family, evenly spread; one that ends at MOST sweeps, or after SECONDS, counts with the sweeps that
 it took. --pictures draws each published distribution with ours, as shares of problems that have at
 most so many.
+
+--only measures these families again; the other rows stay as they are stored.
 
 --report draws the figures 2 to 5 of RT-0444 from ours: contacts, degrees of freedom and their ratio
 of Chain, Capsules, BoxesStack and KaplasTower.
@@ -205,6 +207,29 @@ def distributions(theirs: Any, ours: dict[str, Any], own: Any) -> list[dict[str,
     return table
 
 
+def keyed(table: Sequence[dict[str, Any]]) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """The rows by the published set that they stand under, their own set, and their measure."""
+    found, head = {}, ""
+    for row in table:
+        if row["set"].startswith("*"):
+            head = row["set"]
+        found[head, row["set"], row.get("of", "")] = row
+    return found
+
+
+def renewed(name: str, table: Sequence[dict[str, Any]], only: Sequence[str]) -> list[Any]:
+    """The stored table NAME, with the rows of some families from another one. SystemExit."""
+    path = _results.FOLDER / f"{name}.csv"
+    if not path.is_file():
+        raise SystemExit(f"{path}: is not stored; without --only all of it is measured")
+    with path.open(newline="", encoding="utf-8") as file:
+        stored = keyed(list(csv.DictReader(file)))
+    fresh = {key: row for key, row in keyed(table).items() if key[1] in only}
+    if unknown := fresh.keys() - stored.keys():
+        raise SystemExit(f"{path}: has no row of {min(unknown)[1]}; measure all, without --only")
+    return list((stored | fresh).values())
+
+
 def show(table: Sequence[dict[str, Any]]) -> None:
     """Print a table."""
     print("| " + " | ".join(table[0]) + " |")
@@ -224,14 +249,25 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0, help="limit of a solve")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of both")
     parser.add_argument("--report", type=Path, help="folder for the figures of RT-0444")
+    parser.add_argument("--only", nargs="+", metavar="SET/FAMILY", help="measure these again")
     _results.add_option(parser)
     own = parser.parse_args()
     ours = families(own.folders)
+    again = ""
+    if own.only:
+        if missing := set(own.only) - ours.keys():
+            parser.error(f"{min(missing)}: is in none of the folders")
+        if not own.results:
+            parser.error("--only renews a stored table: name it (--results)")
+        ours = {name: ours[name] for name in own.only}
+        again = f" Measured last: {', '.join(own.only)}."
     if own.report:
         report(ours, own.report)
         return
     theirs = published(own.files) if own.files else {}
     table = beside(ours, own.sample, own.limit)
+    if own.only:
+        table = renewed(own.results, table, own.only)
     show(table)
     if own.results:
         _results.store(
@@ -239,13 +275,15 @@ def main() -> None:
             table,
             title="Published sets (in italics) and ours",
             note=f"Rank ratio and conditioning are of at most {own.sample} problems of a"
-            f" family, evenly spread, of at most {own.limit} contact components.",
+            f" family, evenly spread, of at most {own.limit} contact components.{again}",
         )
     if not own.files:
         return
     if not theirs:
         raise SystemExit(f"{own.files}: lists no file")
     spread = distributions(theirs, ours, own)
+    if own.only:
+        spread = renewed(f"{own.results}-distributions", spread, own.only)
     show(spread)
     if own.results:
         _results.store(
@@ -254,7 +292,7 @@ def main() -> None:
             title="Distributions of the published files (in italics) and ours",
             note="Sizes of published files, and the sweeps that nsgs took on them, are those in"
             f" their names. Ours: nsgs to {_results.power(TOLERANCE)} on at most {own.sample}"
-            f" problems of a family, at most {own.most} sweeps or {own.seconds:g} s each.",
+            f" problems of a family, at most {own.most} sweeps or {own.seconds:g} s each.{again}",
         )
 
 

@@ -247,7 +247,7 @@ REGIMES: dict[str, Regime] = {
         "945_SP_Box_PL",
         {},
         keep=60,
-        steps=501,
+        steps=500,
         deepest=0.2,
         in_time=True,
         spheres=True,

@@ -5,13 +5,17 @@ from __future__ import annotations
 import csv
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import fclib
 from fclib import collections
 from fclib.collections.plan import Plan
+from workshop.sets import collection_table, differences
+from workshop.tables import _results
 from workshop.tables import published_beside_ours as script
 
 pytest.importorskip("pyarrow")
@@ -93,6 +97,69 @@ def test_ours_stand_under_the_published_files(
     ]
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert names == [f"{PUBLISHED}-{label}.png" for label in ("contacts", "sweeps")]
+
+
+def test_a_family_is_measured_again(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other rows stay, under the same published sets."""
+    monkeypatch.setattr(_results, "FOLDER", tmp_path)
+    run(monkeypatch, built, "--results", "sets")
+    with (tmp_path / "sets.csv").open(newline="") as file:
+        stored = [row | {"problems": "77"} for row in csv.DictReader(file)]
+    _results.store("sets", stored, title="Sets", command="by hand")
+    only = ("--only", "rt444/BoxesStack")
+    run(monkeypatch, built, "--results", "sets", *only)
+    with (tmp_path / "sets.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["set"] for row in rows] == [row["set"] for row in stored]
+    assert {row["problems"] for row in rows if row["set"] == "rt444/BoxesStack"} == {"5"}
+    assert {row["problems"] for row in rows if row["set"].startswith("*")} == {"77"}
+    assert "Measured last: rt444/BoxesStack." in (tmp_path / "sets.json").read_text()
+    _results.store("sets", stored[:1], title="Sets", command="by hand")
+    with pytest.raises(SystemExit, match=r"sets.csv: has no row of rt444/BoxesStack"):
+        run(monkeypatch, built, "--results", "sets", *only)
+    with pytest.raises(SystemExit, match=r"none.csv: is not stored"):
+        run(monkeypatch, built, "--results", "none", *only)
+
+
+def test_contacts_and_bodies_are_counted(built: Path, tmp_path: Path) -> None:
+    name = "rt444/BoxesStack"
+    (row,) = differences.closed(built, name)
+    counts = [fclib.read(path).nc for path in (built / name).glob("*-global.hdf5")]
+    assert row["contacts"] == collection_table.span(counts)
+    assert (row["set"], row["problems"]) == (name, "5")
+    # the corners of one box; with more boxes contacts are on several faces
+    assert row["inside the face"] == "0"
+    files = listed(tmp_path / "files.csv", [(FILES, 1, 6 * k, 2 * k) for k in range(1, 6)])
+    with pytest.raises(SystemExit, match="rt444/Nothing: no problem"):
+        next(differences.untouched(built, "rt444/Nothing", files))
+
+
+def test_contacts_at_the_border_are_told_from_those_inside() -> None:
+    x, y = np.meshgrid(np.arange(4.0), np.arange(5.0))
+    point = np.column_stack((x.ravel(), y.ravel(), np.zeros(20)))
+    normal = np.tile((0.0, 0.0, 1.0), (20, 1))
+    assert differences.inside(SimpleNamespace(normal=normal, point=point)) == 6
+    point[3, 2] = 1.0
+    assert differences.inside(SimpleNamespace(normal=normal, point=point)) is None
+    point[3, 2], normal[3] = 0.0, (0.0, 1.0, 0.0)
+    assert differences.inside(SimpleNamespace(normal=normal, point=point)) is None
+
+
+def test_bodies_that_nothing_touches_are_counted(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "rt444/BoxesStack"
+    published = {"set": PUBLISHED, "ours": name, "files": f"{FILES}/"}
+    monkeypatch.setattr(differences, "sets", lambda: [published])
+    # ten bodies, and contacts with two ends each
+    files = listed(tmp_path / "files.csv", [(FILES, 1, 60, k) for k in (1, 4, 5, 9, 20)])
+    rows = list(differences.untouched(built, name, files))
+    assert [row["published contacts"] for row in rows] == ["1", "4", "5", "9", "20"]
+    assert [row["of them untouched, at least"] for row in rows] == ["8", "2", "0", "0", "0"]
+    own = {fclib.read(path).nc for path in (built / name).glob("*-global.hdf5")}
+    assert {int(row["our contacts"]) for row in rows} <= own
 
 
 def test_a_list_without_the_columns_is_named(

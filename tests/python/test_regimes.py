@@ -12,7 +12,7 @@ import pytest
 import fclib
 import fclib.simulate
 from fclib import collections
-from fclib.collections import published
+from fclib.collections import published, set_index
 from fclib.scenes.local_problems import ChuteLocalProblems
 
 # MuJoCo has no release for the oldest Python that fclib takes
@@ -109,6 +109,31 @@ def test_steps_are_chosen_by_every_figure_that_is_known() -> None:
     assert not set(far) & set(kept)
     filled = regimes.chosen([*steps, *far, unknown], dataclasses.replace(regime, fill=True))
     assert set(filled) == {*steps, unknown}
+
+
+def test_steps_evenly_in_time_keep_those_of_chosen_sets() -> None:
+    found = [row_of(k, 100 + k) for k in range(101)]
+    stored = [row_of(k, 1000 + k) for k in (3, 4, 50, 77)]
+    kept = regimes.in_time(found, stored, {3, 4}, 11)
+    numbers = [row.number for row in kept]
+    # 3 and 4 take the places of 0 and 10; 50 is one of the steps anyway, and 77 is none
+    assert numbers == [3, 4, 20, 30, 40, 50, 60, 70, 80, 90, 100]
+    assert [row.contacts for row in kept if row.number in (3, 4, 20, 50)] == [1003, 1004, 120, 1050]
+    assert [row.number for row in regimes.in_time(found, [], set(), 3)] == [0, 50, 100]
+
+
+def test_states_of_chosen_sets_are_known_by_their_digests() -> None:
+    path = published.path_of("decks/SpheresInPlates", "1")
+    if path is None:
+        pytest.skip("the published states are not here")
+    states = collections.read_trajectory(path)
+    numbers = regimes.in_sets(states)
+    assert numbers
+    assert numbers < set(states.number.tolist())
+    listed = {
+        one.number for one in set_index.choices("standard") if one.family == "SpheresInPlates"
+    }
+    assert numbers == listed
 
 
 def test_problems_of_one_contact_are_conditioned_as_published() -> None:

@@ -43,7 +43,7 @@ def published_of(name: str) -> list[dict[str, str]]:
 
 def problems(folder: Path, name: str, count: int | None) -> Iterator[Any]:
     """The problems of a built family, all or so many. SystemExit if there is none."""
-    files = sorted((folder / name).glob("*.hdf5"))
+    files = sorted((folder / name).glob("*-global.hdf5"))
     if not files:
         raise SystemExit(f"{folder / name}: no problem; fclib collection build {name} makes them")
     places = np.linspace(0, len(files) - 1, min(count or len(files), len(files)))
@@ -54,10 +54,12 @@ def problems(folder: Path, name: str, count: int | None) -> Iterator[Any]:
 def inside(contacts: Any) -> int | None:
     """How many are inside the rectangle around all; None if these are on several faces."""
     normals = np.reshape(contacts.normal, (-1, 3))
+    points = np.reshape(contacts.point, (-1, 3))
     axis = int(np.abs(normals[0]).argmax())
-    if np.ptp(normals, axis=0).max() > FLAT:
+    apart = np.ptp(points @ normals[0])
+    if np.ptp(normals, axis=0).max() > FLAT or apart > FLAT * np.ptp(points, axis=0).max():
         return None
-    places = np.delete(np.reshape(contacts.point, (-1, 3)), axis, axis=1)
+    places = np.delete(points, axis, axis=1)
     margin = FLAT * np.ptp(places, axis=0)
     low, high = places.min(axis=0) + margin, places.max(axis=0) - margin
     return int(((places > low) & (places < high)).all(axis=1).sum())

@@ -457,7 +457,7 @@ def in_time(found: list[Row], stored: list[Row], stays: set[int], count: int) ->
     places = [found[k] for k in evenly(len(found), count)]
     old = sorted(stays)
     apart = [[abs(number - row.number) for row in places] for number in old]
-    for k, place in zip(*linear_sum_assignment(np.reshape(apart, (len(old), -1))), strict=True):
+    for k, place in zip(*linear_sum_assignment(np.reshape(apart, (len(old), count))), strict=True):
         places[place] = known[old[k]]
     return sorted((known.get(row.number, row) for row in places), key=lambda row: row.number)
 

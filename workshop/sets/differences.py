@@ -89,16 +89,18 @@ def closed(folder: Path, name: str) -> Iterator[dict[str, str]]:
 
 def untouched(folder: Path, name: str, files: Path) -> Iterator[dict[str, str]]:
     """Published problems beside those of ours with the nearest number of contacts."""
-    (theirs,) = published_of(name)
+    begins = tuple(row["files"] for row in published_of(name) if row["files"])
     with files.open(newline="", encoding="utf-8") as file:
-        listed = [
+        listed = sorted(
             (int(row["contacts"]), int(row["dof"]) // 6)
             for row in csv.DictReader(file)
-            if f"{row['set']}/{row['file']}".startswith(theirs["files"]) and row["dof"]
-        ]
+            if f"{row['set']}/{row['file']}".startswith(begins) and row["dof"] and row["contacts"]
+        )
+    if not listed:
+        raise SystemExit(f"{files}: has no file of the published set that {name} stands beside")
     ours = sorted((problem.nc, problem.n // 6) for problem in problems(folder, name, None))
     for share in SHARES:
-        contacts, bodies = sorted(listed)[round(share * (len(listed) - 1))]
+        contacts, bodies = listed[round(share * (len(listed) - 1))]
         own_contacts, own_bodies = min(ours, key=lambda own: abs(own[0] - contacts))
         yield {
             "set": name,

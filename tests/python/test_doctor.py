@@ -188,6 +188,12 @@ def test_the_table_is_for_people(
     assert '-> pip install "scs>=3"' in text
     assert "-> pip install pin" in text
     assert "1 broken: do what its arrow says" in text
+    with pytest.raises(typer.Exit) as stop:
+        command(as_json=True)
+    assert stop.value.exit_code == 1
+    assert [json.loads(line)["state"] for line in capsys.readouterr().out.splitlines()] == [
+        *("ok", "broken", "absent")
+    ]
     monkeypatch.setattr(doctor, "examine", lambda: [found[0], found[2]])
     with pytest.raises(typer.Exit) as stop:
         command()

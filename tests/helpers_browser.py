@@ -100,7 +100,7 @@ def check_accessible(page: Any) -> None:
     page.wait_for_function(SETTLED)  # the fade is over
     found = page.evaluate("axe.run(document, { resultTypes: ['violations'], preload: false })")
     wrong = [(one["id"], one["nodes"][0]["html"][:200]) for one in found["violations"]]
-    assert not wrong, (page.url, page.viewport_size)
+    assert not wrong, (wrong, page.url, page.viewport_size)
 
 
 def press_all(page: Any) -> None:

@@ -460,12 +460,12 @@ def test_a_periodic_cell_is_outlined(opening: Any, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site of 48,000 runs, of which curves have no bands and are not drawn value by value."""
+    """A site of 24,000 runs, of which curves have no bands and are not drawn value by value."""
     folder = tmp_path_factory.mktemp("large")
-    report_size.fill(folder / "runs.sqlite", 1200, 40)
+    report_size.fill(folder / "runs.sqlite", 1200, 20)
     with Campaigns([folder / "runs.sqlite"]) as campaigns:
         counts = build_site(campaigns, folder / "site", views=0)
-    assert counts["runs"] == 48_000
+    assert counts["runs"] == 24_000
     return folder / "site"
 
 
@@ -485,7 +485,7 @@ def test_a_large_campaign_is_browsed(opening: Any, large: Path) -> None:
     assert page.evaluate("typeof Plotly") == "undefined"
     page.click("main tbody a >> nth=0")
     page.wait_for_selector("main[data-page=problem]")
-    assert "40 runs" in page.inner_text("main")
+    assert "20 runs" in page.inner_text("main")
 
     # the first profile and the answer need neither Plotly nor the costs of all runs
     page = go("#/overview")
@@ -518,7 +518,7 @@ def test_a_large_campaign_is_browsed(opening: Any, large: Path) -> None:
     assert plot.locator("> svg").count() == 0
 
     page = go("#/profiles?weigh=instances")
-    plot = draw(page, traces=40)
+    plot = draw(page, traces=20)
     costs = read_data(large, "t0-cpu_s")
     best = np.nanmin(np.array(costs, dtype=float), axis=0)
     fastest = [np.mean(np.array(own, dtype=float) <= best) for own in costs]

@@ -1,5 +1,6 @@
 """Chromium for tests of pages: without windows where there is such a one."""
 
+import importlib
 import shutil
 import threading
 from collections.abc import Iterator
@@ -94,9 +95,8 @@ PRESS = """document.querySelectorAll("main button, main .modebar-btn, main summa
 
 def check_accessible(page: Any) -> None:
     """Nothing against a page, as it is now, is found by axe."""
-    import axe_playwright_python
-
-    page.add_script_tag(path=Path(axe_playwright_python.__file__).parent / "axe.min.js")
+    axe: Any = importlib.import_module("axe_playwright_python")
+    page.add_script_tag(path=Path(axe.__file__).parent / "axe.min.js")
     page.wait_for_function(SETTLED)  # the fade is over
     found = page.evaluate("axe.run(document, { resultTypes: ['violations'], preload: false })")
     wrong = [(one["id"], one["nodes"][0]["html"][:200]) for one in found["violations"]]

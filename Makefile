@@ -66,7 +66,7 @@ demo: setup
 
 test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	cmake --build $(BUILD) --target fclib_tests fclib
-	ctest --test-dir $(BUILD) --output-on-failure
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 	@if command -v emcmake >/dev/null && command -v node >/dev/null; then $(MAKE) wasm; \
 	  else echo "== there is no Emscripten: the tests of the module for browsers are skipped"; fi
 	@# compiled tests are kept, where the environment forbids it too: each process would make them anew

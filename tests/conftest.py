@@ -1,11 +1,13 @@
 """What all tests share: the folder of real problems, and the settings of Hypothesis."""
 
+import fcntl
 import gc
 import os
 import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -30,31 +32,36 @@ hypothesis.settings.load_profile("fclib")
 LONGEST = (
     "test_report_screens",
     "test_report_browser",
-    "test_trajectory",
-    "test_capi",
     "test_bench_cluster",
     "test_bench_limits",
+    "test_trajectory",
     "test_collection",
-    "test_docs_code",
+    "test_capi",
     "test_docs",
+    "test_docs_code",
     "test_tutorials",
     "test_report_compute",
-    "test_auto",
-    "test_machines",
     "test_bench",
-    "test_bench_sequences",
-    "test_solvers",
-    "test_malformed",
     "test_report",
-    "test_examples",
-    "test_external",
-    "test_scenes",
-    "test_robots",
+    "test_solvers",
+    "test_bench_sequences",
     "test_peers",
-    "test_doctor",
-    "test_interrupt",
-    "test_bench_profiles",
     "test_analysis",
+    "test_interrupt",
+    "test_examples",
+    "test_scenes",
+    "test_machines",
+    "test_auto",
+    "test_standard",
+    "test_bench_profiles",
+    "test_external",
+    "test_doctor",
+    "test_malformed",
+    "test_recorders",
+    "test_robots",
+    "test_handed",
+    "test_authors_decks",
+    "test_io",
 )
 
 # a shell's job in the background ignores Ctrl-C, and so would all that it starts
@@ -103,3 +110,69 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"there are no real problems in {folder}; FCLIB_DATA names another folder")
     return folder
+
+
+# ---- the report: a small collection, runs of it and their site
+
+
+@pytest.fixture(scope="session")
+def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of these: the first process that asks for it makes it, and no test changes it."""
+    from helpers_report import make_report
+
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    done = folder / "reported" / "done"
+    with (folder / "reported.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            make_report(done.parent)
+            done.touch()
+    return done.parent
+
+
+@pytest.fixture(scope="session")
+def collection(reported: Path) -> Path:
+    return reported / "collection"
+
+
+@pytest.fixture(scope="session")
+def store(reported: Path) -> Path:
+    return reported / "runs.sqlite"
+
+
+@pytest.fixture(scope="session")
+def site(reported: Path) -> Path:
+    return reported / "a site #1"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium. While it runs, a process has a loop of asyncio: it ends with its file of tests."""
+    from helpers_browser import chromium
+
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture
+def opening(browser: Any) -> Iterator[Any]:
+    """What makes openers of the pages of a site, or of a file."""
+    from helpers_browser import Opener
+
+    made: list[Opener] = []
+
+    def start(place: Path) -> Opener:
+        made.append(Opener(browser, place))
+        return made[-1]
+
+    yield start
+    for opener in made:
+        opener.close()
+
+
+@pytest.fixture
+def go(opening: Any, site: Path) -> Any:
+    """An opener of the pages of the site."""
+    return opening(site)

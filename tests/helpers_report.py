@@ -66,6 +66,15 @@ def make_store(
     return path
 
 
+def make_report(folder: Path) -> None:
+    """A collection, a store and their site: four pictures to turn, and a name to be escaped."""
+    from fclib.report import Campaigns, build_site
+
+    collection = make_collection(folder / "collection")
+    with Campaigns([make_store(folder / "runs.sqlite", collection)]) as campaigns:
+        build_site(campaigns, folder / "a site #1", collection, views=5)
+
+
 def add_runs(
     path: Path,
     facts: Sequence[ProblemFacts],

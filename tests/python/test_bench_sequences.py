@@ -251,7 +251,7 @@ bench.run_campaign(bench.Campaign.of(entries), path, jobs=2, show=show)
 
 
 # a start costs seconds: fewer kills if all steps are solved
-@pytest.mark.parametrize(("kind", "after"), [("smooth", (5, 6)), ("broken", (5, 4, 3, 6))])
+@pytest.mark.parametrize(("kind", "after"), [("smooth", (5,)), ("broken", (5, 6))])
 def test_a_killed_campaign_ends_as_an_uninterrupted_one(
     kind: str,
     after: tuple[int, ...],

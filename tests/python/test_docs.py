@@ -7,7 +7,6 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import pytest
 
 import fclib
 from fclib.collections import plan
-from helpers_browser import chromium, served
+from helpers_browser import served
 
 pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
 pytest.importorskip("mujoco")
@@ -209,12 +208,6 @@ def test_examples_begin_with_their_pictures_in_a_small_size(
 
 
 # ---- in a browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as opened:
-        yield opened
 
 
 def test_pages_in_a_browser(site: Path, browser: Any) -> None:

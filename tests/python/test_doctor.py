@@ -13,22 +13,8 @@ import pytest
 import typer
 
 import fclib
-from fclib import _core, doctor
+from fclib import _core, doctor, external
 from fclib.cli.doctor import command
-
-
-def run(
-    *arguments: str, **environment: str
-) -> tuple[dict[str, dict[str, Any]], subprocess.CompletedProcess[str]]:
-    """The findings by their names, and the process."""
-    done = subprocess.run(
-        [sys.executable, "-m", "fclib", "doctor", "--json", *arguments],
-        capture_output=True,
-        text=True,
-        env=os.environ | environment,
-    )
-    found = [json.loads(line) for line in done.stdout.splitlines()]
-    return {finding["name"]: finding for finding in found}, done
 
 
 def before(*folders: Path) -> str:
@@ -48,8 +34,10 @@ def pretend(folder: Path, name: str, version: str, code: str = "", package: str 
 
 
 def test_what_is_here() -> None:
-    findings, done = run()
+    command = [sys.executable, "-m", "fclib", "doctor", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+    findings = {one["name"]: one for one in map(json.loads, done.stdout.splitlines())}
     keys = ["part", "name", "state", "found", "purpose", "problem", "remedy"]
     assert all(list(finding) == keys for finding in findings.values())
     assert findings["fclib"]["found"] == fclib.__version__
@@ -73,9 +61,7 @@ def test_what_is_here() -> None:
 
 
 @pytest.fixture(scope="module")
-def pretended(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[dict[str, dict[str, Any]], subprocess.CompletedProcess[str]]:
+def pretended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, doctor.Finding]:
     """What is found where packages are broken, too old, or of another interpreter."""
     folder = tmp_path_factory.mktemp("pretended")
     pretend(folder, "clarabel", "99.0", "import nowhere")
@@ -84,30 +70,42 @@ def pretended(
     pretend(folder, "pooch", "9.0", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     pretend(folder, "pinocchio", "99.1", "ADMMConstraintSolver = PGSConstraintSolver = 0", "pin")
     pretend(folder, "siconos", "99.2", "version = '99.3'")
-    return run(PYTHONPATH=before(folder), FCLIB_SICONOS_PYTHON=sys.executable)
+    packages, others = ("clarabel", "scs", "mujoco", "pooch", "numpy"), ("pinocchio", "siconos")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        patch.setenv("PYTHONPATH", before(folder))
+        patch.setenv("FCLIB_SICONOS_PYTHON", sys.executable)
+        patch.setattr(doctor, "requirements", of_names(doctor.requirements(), packages))
+        adapters = [one for one in external.adapters() if one.PREFIX.rstrip(":") in others]
+        patch.setattr(external, "adapters", lambda: adapters)
+        return {finding.name: finding for finding in doctor.examine()}
 
 
-def test_what_is_broken_is_said_with_what_to_do(pretended: Any) -> None:
-    findings, done = pretended
-    assert done.returncode == 1
-    assert "No module named 'nowhere'" in findings["clarabel"]["problem"]
-    assert "pip install --force-reinstall" in findings["clarabel"]["remedy"]
-    assert findings["scs"]["problem"] == "is 0.1, and fclib needs >=3.2.4"
-    assert findings["scs"]["remedy"] == 'pip install "scs>=3.2.4"'
-    assert findings["pooch"]["problem"] == "the process was ended by SIGSEGV"
+def of_names(known: list[doctor.Requirement], names: tuple[str, ...]) -> Any:
+    """Gives those of some packages: each takes a process that imports it."""
+    return lambda: [one for one in known if one.package in names]
+
+
+def test_what_is_broken_is_said_with_what_to_do(pretended: dict[str, doctor.Finding]) -> None:
+    assert "No module named 'nowhere'" in pretended["clarabel"].problem
+    assert "pip install --force-reinstall" in pretended["clarabel"].remedy
+    assert pretended["scs"].problem == "is 0.1, and fclib needs >=3.2.4"
+    assert pretended["scs"].remedy == 'pip install "scs>=3.2.4"'
+    assert pretended["pooch"].problem == "the process was ended by SIGSEGV"
     if sys.version_info >= (3, 11):
-        assert findings["mujoco"]["problem"] == "is 4.0.1, and fclib needs 4.0.0"
-        assert findings["mujoco"]["remedy"] == 'pip install "mujoco==4.0.0"'
-    broken = {name for name, finding in findings.items() if finding["state"] == "broken"}
+        assert pretended["mujoco"].problem == "is 4.0.1, and fclib needs 4.0.0"
+        assert pretended["mujoco"].remedy == 'pip install "mujoco==4.0.0"'
+    broken = {name for name, finding in pretended.items() if finding.state == "broken"}
     assert broken >= {"clarabel", "scs", "pooch"}
-    assert "numpy" not in broken
+    assert "numpy" in set(pretended) - broken
 
 
-def test_solvers_that_are_no_extra_have_their_versions(pretended: Any) -> None:
-    findings, _ = pretended
-    assert findings["pinocchio"]["found"] == "99.1"
+def test_solvers_that_are_no_extra_have_their_versions(
+    pretended: dict[str, doctor.Finding],
+) -> None:
+    assert pretended["pinocchio"].found == "99.1"
     # the word of the other interpreter, not what is installed beside fclib
-    assert findings["siconos"]["found"] == f"99.3 in {sys.executable}"
+    assert pretended["siconos"].found == f"99.3 in {sys.executable}"
 
 
 def test_a_folder_that_takes_no_files_is_found(tmp_path: Path) -> None:
@@ -190,6 +188,12 @@ def test_the_table_is_for_people(
     assert '-> pip install "scs>=3"' in text
     assert "-> pip install pin" in text
     assert "1 broken: do what its arrow says" in text
+    with pytest.raises(typer.Exit) as stop:
+        command(as_json=True)
+    assert stop.value.exit_code == 1
+    assert [json.loads(line)["state"] for line in capsys.readouterr().out.splitlines()] == [
+        *("ok", "broken", "absent")
+    ]
     monkeypatch.setattr(doctor, "examine", lambda: [found[0], found[2]])
     with pytest.raises(typer.Exit) as stop:
         command()

@@ -17,12 +17,19 @@ import fclib
 from fclib.bench import Job, Limits, Record, SolverChoice, Store
 from fclib.bench.profiles import caption as caption_of
 from fclib.collections.figures import bins_of, is_whole
-from fclib.report import Campaigns, build_site, view_of, write_view
-from helpers_browser import chromium, colours
+from fclib.report import Campaigns, build_site
+from helpers_browser import (
+    DESK,
+    PHONE,
+    UNFOLD,
+    Opener,
+    check_accessible,
+    colours,
+    press_all,
+    turn,
+)
 from helpers_report import (
     made_facts,
-    make_collection,
-    make_store,
     read_data,
     skip_without_libraries,
 )
@@ -35,8 +42,6 @@ pytest.importorskip("pyarrow")
 skip_without_libraries()
 pytestmark = pytest.mark.slow
 
-DESK = {"width": 1440, "height": 900}
-PHONE = {"width": 390, "height": 844}
 SIZES = {"desk": DESK, "phone": PHONE}
 PROBLEM = "#/problem/small/BoxesStack/0008"
 COPY, ORIGINAL = "small/BoxesStack/0009", "small/BoxesStack/0008"
@@ -65,25 +70,8 @@ WHOLE: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "about": ("#/about", ("h1", ".copy"), ()),
 }
 
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make_collection(tmp_path_factory.mktemp("collection"))
-
-
-@pytest.fixture(scope="module")
-def site(collection: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("built")
-    store = make_store(folder / "runs.sqlite", collection)
-    with Campaigns([store]) as campaigns:
-        build_site(campaigns, folder / "site", collection, views=5)
-    return folder / "site"
+# what is used on another page of problems too
+ALIKE = ("copy", "problem without a picture")
 
 
 @pytest.fixture(scope="module")
@@ -94,26 +82,12 @@ def screens() -> Path:
     return folder
 
 
-def open_page(browser: Any, site: Path, address: str, **settings: Any) -> Any:
-    """A page, when its table or picture is there; what goes wrong on it is an error."""
-    page = browser.new_page(**settings)
-    page.set_default_timeout(60_000)
-    page.on("pageerror", lambda error: pytest.fail(f"{address}: {error}"))
-    page.goto((site / "index.html").as_uri() + address)
-    page.wait_for_selector("main h1")
-    return page
-
-
 @pytest.fixture(scope="module")
 def problem_pages(browser: Any, site: Path) -> Iterator[dict[str, Any]]:
     """The page of a problem at each size, for several tests: to draw its scene takes seconds."""
-    pages = {
-        size: open_page(browser, site, PROBLEM, viewport=viewport)
-        for size, viewport in SIZES.items()
-    }
-    yield pages
-    for page in pages.values():
-        page.close()
+    opener = Opener(browser, site)
+    yield {size: opener(PROBLEM, viewport=viewport) for size, viewport in SIZES.items()}
+    opener.close()
 
 
 def check_words(page: Any, address: str) -> None:
@@ -129,14 +103,41 @@ def check_words(page: Any, address: str) -> None:
 # ---- the first screen
 
 
-@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", WHOLE)
-def test_the_first_screen_has_what_one_came_for(
-    name: str, size: str, browser: Any, site: Path, screens: Path
+def test_a_page_shows_what_one_came_for_and_can_be_used(
+    name: str, go: Opener, screens: Path
 ) -> None:
+    """On a desk, in the light, and on a phone, in the dark: its first screen, and all below."""
     address, both, desk = WHOLE[name]
-    page = open_page(browser, site, address, viewport=SIZES[size])
-    for what in (*both, *(desk if size == "desk" else ())):
+    page = go(address, viewport=DESK, color_scheme="light")
+    check_first_screen(page, (*both, *desk), screens / f"{name.replace(' ', '-')}-desk.png")
+    assert page.locator("nav a[aria-current=page]").count() == (name != "about")
+    check_words(page, address)
+    for picture in page.locator("main img").all():
+        picture.scroll_into_view_if_needed()
+        page.wait_for_function(
+            "i => i.complete && i.naturalWidth > 0", arg=picture.element_handle()
+        )
+    if name not in ALIKE:
+        check_accessible(page)
+    page.close()
+    page = go(address, viewport=PHONE, color_scheme="dark")
+    check_first_screen(page, both, screens / f"{name.replace(' ', '-')}-phone.png")
+    if name in ALIKE:
+        return
+    # what is folded too, as the controls of a figure for a paper
+    page.evaluate(UNFOLD)
+    folded = page.locator("main details.paper select")
+    assert all(one.is_visible() for one in folded.all())
+    assert folded.count() >= 2 * (name == "profiles")
+    check_accessible(page)
+    press_all(page)
+
+
+def check_first_screen(page: Any, whole: tuple[str, ...], file: Path) -> None:
+    """What stands on it, whole; nothing is as wide as to need scrolling."""
+    size = page.viewport_size
+    for what in whole:
         found = page.locator(f"main {what}").first
         found.wait_for()
         if ".plot" in what:
@@ -145,16 +146,13 @@ def test_the_first_screen_has_what_one_came_for(
         assert box is not None, what
         assert box["width"] > 0, what
         assert box["y"] >= 0, what
-        assert box["y"] + box["height"] <= SIZES[size]["height"], (what, box)
+        assert box["y"] + box["height"] <= size["height"], (what, box)
     assert page.evaluate("scrollY") == 0
-    assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size]["width"]
-    shot = page.screenshot(path=screens / f"{name.replace(' ', '-')}-{size}.png")
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    shot = page.screenshot(path=file)
     image = pytest.importorskip("PIL.Image")
     seen = np.asarray(image.open(io.BytesIO(shot)).convert("RGB"))
     assert colours(seen) > 30  # no empty page
-    if size == "desk":
-        check_words(page, address)
-    page.close()
 
 
 def test_the_picture_is_beside_its_facts_or_above_them(problem_pages: dict[str, Any]) -> None:
@@ -191,21 +189,6 @@ def column_of(site: Path, key: str) -> list[Any]:
     """A column of numbers of the catalogue of a site."""
     columns = read_data(site, "catalogue")["columns"]
     return list(next(c["values"] for c in columns if c["key"] == key))
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_the_page_of_a_file_begins_with_its_picture(
-    size: str, browser: Any, collection: Path, tmp_path: Path
-) -> None:
-    file = sorted(collection.rglob("*-global.hdf5"))[-1]
-    write_view(view_of(read(file), read_solution(file)), tmp_path / "view.html")
-    page = browser.new_page(viewport=SIZES[size])
-    page.goto((tmp_path / "view.html").as_uri())
-    page.locator(".scene .plot[data-drawn]").wait_for()
-    for what in (".scene .plot", "dl.chief"):
-        box = page.locator(what).bounding_box()
-        assert box["y"] + box["height"] <= SIZES[size]["height"], what
-    page.close()
 
 
 def row_of(site: Path, name: str) -> dict[str, Any]:
@@ -258,19 +241,17 @@ def test_what_is_not_asked_for_first_is_folded(problem_pages: dict[str, Any]) ->
 # ---- the catalogue
 
 
-def test_filters_are_beside_the_table_and_closed_on_a_phone(browser: Any, site: Path) -> None:
-    page = open_page(browser, site, "#/catalogue?runs=1", viewport=DESK)
+def test_filters_are_beside_the_table_and_closed_on_a_phone(go: Opener, site: Path) -> None:
+    page = go("#/catalogue?runs=1", viewport=DESK)
     table, filters = (page.locator(f"main {one}") for one in (".dt-container", ".filters"))
     assert filters.get_attribute("open") is not None
     beside = filters.bounding_box()
     assert beside["x"] + beside["width"] <= table.bounding_box()["x"]
-    page.close()
-    page = open_page(browser, site, "#/catalogue?runs=1", viewport=PHONE)
+    page = go("#/catalogue?runs=1", viewport=PHONE)
     assert filters_closed(page)
     assert "1 chosen" in page.locator(".filters summary").inner_text()
     names = page.locator("main tbody th").all_inner_texts()
     assert len(names) == sum(bool(x) for x in column_of(site, "runs"))
-    page.close()
 
 
 def filters_closed(page: Any) -> bool:
@@ -280,8 +261,8 @@ def filters_closed(page: Any) -> bool:
 # ---- the overview
 
 
-def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None:
-    page = open_page(browser, site, "#/overview", viewport=DESK)
+def test_the_profile_is_of_the_chosen_problems(go: Opener, site: Path) -> None:
+    page = go("#/overview", viewport=DESK)
     plot = page.locator(".first .plot")
     plot.hover()
     plot.and_(page.locator("[data-drawn]")).wait_for()
@@ -307,15 +288,13 @@ def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None
         "([cell, text]) => cell.textContent.trim() === text",
         arg=[last.first.element_handle(), tables[-1]["solver"]],
     )
-    page.close()
 
 
-def test_the_overview_lists_no_families(browser: Any, site: Path) -> None:
-    page = open_page(browser, site, "#/overview", viewport=PHONE)
+def test_the_overview_lists_no_families(go: Opener, site: Path) -> None:
+    page = go("#/overview", viewport=PHONE)
     assert page.locator("main .cards").count() == 0
     for name in ("All problems", "all families", "all solvers", "what is open"):
         assert page.get_by_role("link", name=name, exact=True).is_visible()
-    page.close()
 
 
 # ---- a figure for a paper
@@ -326,9 +305,9 @@ HEAR = """new MutationObserver((seen) => seen.forEach((one) => one.addedNodes.fo
 
 
 def test_a_figure_for_a_paper_is_of_what_is_chosen(
-    browser: Any, site: Path, collection: Path, tmp_path: Path
+    go: Opener, site: Path, collection: Path, tmp_path: Path
 ) -> None:
-    page = open_page(browser, site, "#/profiles?tol=1&solvers=auto~nsgs", viewport=DESK)
+    page = go("#/profiles?tol=1&solvers=auto~nsgs", viewport=DESK)
     page.locator("main .plot[data-shown]").first.wait_for()
     page.get_by_text("A figure for a paper").click()
     page.get_by_label("width").select_option("2")
@@ -342,7 +321,6 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
     page.get_by_role("button", name="The figure as PDF").click()
     page.set_content(page.wait_for_function("window.sheet").json_value())
     pdf = page.pdf(prefer_css_page_size=True)
-    page.close()
     # two columns are 174 mm; the printed page is the figure
     assert re.search(r'<svg [^>]*width="493.23pt"', texts["SVG"])
     box = re.search(rb"/MediaBox \[0 0 ([\d.]+) [\d.]+\]", pdf)
@@ -369,18 +347,18 @@ def test_a_figure_for_a_paper_is_of_what_is_chosen(
 # ---- copies
 
 
-def test_all_pages_count_the_same_problems(browser: Any, site: Path) -> None:
+def test_all_pages_count_the_same_problems(go: Opener, site: Path) -> None:
     """A copy is no problem of its own, on any page, also if the list is narrowed."""
     rows = read_data(site, "catalogue")["size"]
     known = read_data(site, "site")
     assert known["copies"] >= 1
     assert known["problems"] + known["copies"] == rows
     copies = f"{known['copies']} {'copy' if known['copies'] == 1 else 'copies'}"
+    page = go("#/about", viewport=DESK)
     for address in ("#/overview", "#/families"):
-        page = open_page(browser, site, address, viewport=DESK)
+        turn(page, address)
         assert f"{known['problems']} problems and {copies}" in page.inner_text("main")
-        page.close()
-    page = open_page(browser, site, "#/catalogue", viewport=DESK)
+    turn(page, "#/catalogue")
     said = page.locator("main input[type=search] >> xpath=../.. >> [role=status]")
     whole = f"{{}} of {known['problems']} problems and {{}} of {copies}"
     assert said.inner_text() == whole.format(known["problems"], known["copies"])
@@ -391,17 +369,16 @@ def test_all_pages_count_the_same_problems(browser: Any, site: Path) -> None:
     page.get_by_text(others, exact=True).wait_for()
     page.get_by_label("filter").fill(COPY.rpartition("/")[2])
     page.get_by_text(whole.format(0, 1), exact=True).wait_for()
-    page.close()
 
 
 def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
-    browser: Any, site: Path
+    go: Opener, site: Path
 ) -> None:
     copy, original = row_of(site, COPY), row_of(site, ORIGINAL)
     assert copy["same_as"] == ORIGINAL
     for key in ("runs", "solved", "class", "solved_by", "best_solver"):
         assert copy[key] == original[key], key
-    page = open_page(browser, site, f"#/problem/{COPY}", viewport=DESK)
+    page = go(f"#/problem/{COPY}", viewport=DESK)
     table = "main [role=region][aria-label$=runs] tbody"
     shown = page.locator(table).inner_text()
     assert len(shown.splitlines()) >= original["runs"]
@@ -409,7 +386,6 @@ def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
     page.locator(".copied a").click()
     page.wait_for_function(f"document.querySelector('h1').textContent === '{ORIGINAL}'")
     assert page.locator(table).inner_text() == shown
-    page.close()
 
 
 # ---- classes
@@ -446,7 +422,7 @@ def store_of(path: Path, errors: dict[int, dict[str, float]], solvers: tuple[str
     return path
 
 
-def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_path: Path) -> None:
+def test_the_page_of_classes_is_of_the_problems_of_the_report(opening: Any, tmp_path: Path) -> None:
     """No class of another set; what no solver of the report solves is open, with its best error.
 
     It is also open if nothing came of any solver, and hard if a solution came too late.
@@ -468,8 +444,9 @@ def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_
         {"problem": "Family0/00000", "error": 2e-5, "by": "nsgs"},
         {"problem": "Family3/00003"},
     ]
+    page = opening(tmp_path / "site")("#/about", viewport=DESK)
     for address in ("#/classes", "#/overview"):
-        page = open_page(browser, tmp_path / "site", address, viewport=DESK)
+        turn(page, address)
         assert "standard" not in page.inner_text("main")
         table = page.locator("table", has_text="2 open problems of this report")
         cells = table.locator("tbody").locator("th, td").all_inner_texts()
@@ -479,13 +456,12 @@ def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_
             assert "fclib solve --time-limit" in page.inner_text("main")
         table.locator("tbody a").first.click()
         page.wait_for_selector("main[data-page=problem]")
-        page.close()
 
 
 # ---- words and axes
 
 
-def test_pages_say_no_more_and_no_less_than_is_known(browser: Any, tmp_path: Path) -> None:
+def test_pages_say_no_more_and_no_less_than_is_known(opening: Any, tmp_path: Path) -> None:
     """Of one problem, one family, one solver and one run; a solver without a description.
 
     Those of many are read with their first screens.
@@ -494,23 +470,22 @@ def test_pages_say_no_more_and_no_less_than_is_known(browser: Any, tmp_path: Pat
     store = store_of(tmp_path / "one.sqlite", {0: {"mine": 1e-3}}, ("mine",))
     with Campaigns([store]) as campaigns:
         build_site(campaigns, small, views=0)
+    page = opening(small)("#/about", viewport=DESK)
     for address in (
         *("overview", "profiles", "catalogue", "families", "family/Family0", "solvers"),
         *("problem/Family0/00000", "solver/mine", "classes"),
     ):
-        page = open_page(browser, small, f"#/{address}", viewport=DESK)
+        turn(page, f"#/{address}")
         check_words(page, address)
-        page.close()
-    page = open_page(browser, small, "#/overview", viewport=DESK)
+    turn(page, "#/overview")
     shown = page.evaluate(
         "[NaN, undefined, null, 0.125].flatMap((x) => [Fclib.percent(x), Fclib.tolerance(x)])"
     )
     assert shown == ["–"] * 6 + ["12.5 %", "1.25e-1"]
     assert "1 solver, 1 problem, 1 family, 1 run, 0 % of them solved" in page.inner_text("main")
-    page.close()
 
 
-def test_a_problem_of_a_store_alone_says_what_is_not_known(browser: Any, tmp_path: Path) -> None:
+def test_a_problem_of_a_store_alone_says_what_is_not_known(opening: Any, tmp_path: Path) -> None:
     """Of a published run, say: its file and its analysis are elsewhere, and its digest is known."""
     store = store_of(tmp_path / "runs.sqlite", {0: {}, 1: {}}, ("mine",))
     with Store(store) as opened:
@@ -523,7 +498,7 @@ def test_a_problem_of_a_store_alone_says_what_is_not_known(browser: Any, tmp_pat
     entries = [row_of(tmp_path / "site", f"Family{k}/0000{k}")["nnz_W"] for k in range(2)]
     assert entries == [None, made_facts(2)[1].nnz]
     digest = made_facts(1)[0].hash
-    page = open_page(browser, tmp_path / "site", "#/problem/Family0/00000", viewport=DESK)
+    page = opening(tmp_path / "site")("#/problem/Family0/00000", viewport=DESK)
     names = page.locator("dl.chief dt").all_inner_texts()
     told = dict(zip(names, page.locator("dl.chief dd").all_inner_texts(), strict=True))
     assert told["μ"] == "not in the stores"
@@ -532,15 +507,13 @@ def test_a_problem_of_a_store_alone_says_what_is_not_known(browser: Any, tmp_pat
     assert f"{{fclib.digest {digest}, FCLIB" in page.locator("#cite + .copy").inner_text()
     facts = page.locator("dl.chief").bounding_box()
     assert facts["x"] < page.locator("h1").bounding_box()["x"] + 5  # no empty place for a picture
-    page.close()
-    page = open_page(browser, tmp_path / "site", "#/overview", viewport=DESK)
+    turn(page, "#/overview")
     machine = page.locator("dl.facts dt", has_text="machine").locator("+ dd").inner_text()
     assert machine == "Abacus"
-    page.close()
 
 
 def test_a_problem_without_a_solution_has_no_reference(
-    browser: Any, collection: Path, tmp_path: Path
+    opening: Any, collection: Path, tmp_path: Path
 ) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     shutil.copytree(collection, tmp_path / "collection")
@@ -554,10 +527,9 @@ def test_a_problem_without_a_solution_has_no_reference(
     build_site(None, tmp_path / "site", tmp_path / "collection", views=0)
     row = row_of(tmp_path / "site", "small/BoxesStack/0000")
     assert (row["has_solution"], row["status"]) == (False, "stalled")
-    page = open_page(browser, tmp_path / "site", "#/problem/small/BoxesStack/0000", viewport=DESK)
+    page = opening(tmp_path / "site")("#/problem/small/BoxesStack/0000", viewport=DESK)
     assert "stalled" in page.locator("main").text_content()
     assert "reference" not in page.locator("main").text_content()
-    page.close()
 
 
 HISTOGRAMS: dict[str, list[float]] = {
@@ -592,9 +564,9 @@ def test_bins_hold_all_values_once(name: str) -> None:
 # many problems, and one alone, which has its contacts only
 @pytest.mark.parametrize(("family", "measures"), [("BoxesStack", 3), ("Alone", 1)])
 def test_histograms_have_whole_counts_and_follow_the_theme(
-    family: str, measures: int, browser: Any, site: Path
+    family: str, measures: int, go: Opener, site: Path
 ) -> None:
-    page = open_page(browser, site, f"#/family/{family}", viewport=DESK, color_scheme="dark")
+    page = go(f"#/family/{family}", viewport=DESK, color_scheme="dark")
     plots = page.locator(".three .plot")
     own = next(f for f in read_data(site, "site")["families"] if f["name"] == family)["histograms"]
     assert plots.count() == len(own) == measures
@@ -612,7 +584,6 @@ def test_histograms_have_whole_counts_and_follow_the_theme(
         assert len(set(ticks)) == len(ticks)
         if one["integer"]:
             assert all(text.isdigit() for text in plot.locator(".xtick text").all_text_contents())
-    page.close()
 
 
 # ---- paper
@@ -628,8 +599,8 @@ LONG_NAMES = """() => document.querySelector("main").append(Fclib.lines({
 
 
 @pytest.mark.parametrize("address", ["#/overview", PROBLEM, "#/family/small/BoxesStack"])
-def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Path) -> None:
-    page = open_page(browser, site, address, viewport=DESK, color_scheme="dark")
+def test_paper_has_the_charts_and_no_menus(address: str, go: Opener, site: Path) -> None:
+    page = go(address, viewport=DESK, color_scheme="dark")
     page.wait_for_function("window.Plotly")
     page.evaluate(LONG_NAMES)
     hidden = page.locator(".plot:not([data-drawn])").count()
@@ -666,4 +637,3 @@ def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Pat
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
     page.emulate_media(media="screen", color_scheme="dark")
     assert page.pdf(format="A4").startswith(b"%PDF")
-    page.close()

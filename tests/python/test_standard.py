@@ -133,6 +133,12 @@ def test_classes_follow_from_runs(runs: Path) -> None:
     # a longer run has no vote, and what it solves is no longer open
     publish(runs, [run(discs, "auto", 9e-9, time_limit=60.0)])
     assert classes_by_problem()[discs] == "hard"
+    # a build asks for one problem, by its digest
+    ratings._by_digest.cache_clear()
+    for known in ratings.ratings_of("tiny")[0]:
+        assert (ratings.class_of("tiny", known.digest) or "") == known.rating
+        assert ratings.class_of("no set", known.digest) is None
+    ratings._by_digest.cache_clear()
 
 
 def test_runs_vote_at_the_limit_of_most_runs(runs: Path) -> None:

@@ -566,7 +566,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         **dict.fromkeys(
             ("open", "stick", "slide", "solver", "status", "tol", "error", "has_solution")
         ),
-        "rating": ratings.classes(plan.collection).get(facts["digest"]),
+        "rating": ratings.class_of(plan.collection, facts["digest"]),
         "left_out": "; ".join(item.left_out) or None,
         **rights_of(plan),
     }

@@ -226,6 +226,12 @@ def digests(own: str) -> dict[int, str]:
     scene = None if stored else set_index.plan_of(own).scene
     if not isinstance(scene, scenes.Assembled):
         return stored
+    return _assembled(scene)
+
+
+@functools.cache
+def _assembled(scene: scenes.Assembled) -> dict[int, str]:
+    """The digests of a family's problems, which are made here unless the family has them."""
     if hasattr(scene.family, "digests"):
         return dict(enumerate(scene.family.digests()))
     return {n: _digest.digest(scene.problem(n)) for n in range(scene.family.problems)}
@@ -238,21 +244,12 @@ def ratings_of(name: str) -> tuple[list[RatedProblem], Basis | None]:
         KeyError: there is no such set.
         RatingError, OSError: results cannot be read.
     """
-    stored: dict[str, list[Run]] = defaultdict(list)
-    for run in runs():
-        stored[run.digest].append(run)
-    problems = members(name)
-    common = Counter(run.limit for own in stored.values() for run in own)
+    known = by_digest()
     rows = []
     voting: list[Run] = []
-    for name_, digest in problems.items():
-        mine = stored[digest[:DIGITS]]
-        limits = {run.limit for run in mine if run.limit is not None}
-        limit = max(limits, key=lambda value: (common[value], -value), default=None)
-        # the last version of a solver has the vote
-        last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
-        # an accepted solution has no limit and no vote
-        voters = [run for run in last.values() if run.limit and run.status != UNSUITABLE]
+    for name_, digest in members(name).items():
+        mine = known[0].get(digest[:DIGITS], [])
+        voters = voters_of(mine, known[1])
         voting += voters
         rows.append(rating_of(name_, digest, mine, voters))
     if not voting:
@@ -267,13 +264,38 @@ def ratings_of(name: str) -> tuple[list[RatedProblem], Basis | None]:
     )
 
 
-@functools.lru_cache
-def classes(name: str) -> Mapping[str, str]:
-    """The class of each problem of a set that was run, by its digest; empty for other sets."""
+def class_of(name: str, digest: str) -> str | None:
+    """The class of a problem of a set by its digest; None if it was not run, or for other sets."""
     try:
-        return {row.digest: row.rating for row in ratings_of(name)[0] if row.rating}
-    except (KeyError, RatingError):
-        return {}
+        if name not in set_index.sets():
+            return None
+        stored, limits = _by_digest()
+        mine = stored.get(digest[:DIGITS], [])
+        return rating_of(name, digest, mine, voters_of(mine, limits)).rating or None
+    except RatingError:
+        return None
+
+
+def by_digest() -> tuple[dict[str, list[Run]], Counter[float | None]]:
+    """The runs of each problem, and how many of all runs have a limit."""
+    stored: dict[str, list[Run]] = defaultdict(list)
+    for run in runs():
+        stored[run.digest].append(run)
+    return stored, Counter(run.limit for own in stored.values() for run in own)
+
+
+# what a build asks for each problem
+_by_digest = functools.lru_cache(by_digest)
+
+
+def voters_of(mine: Sequence[Run], common: Mapping[float | None, int]) -> list[Run]:
+    """The runs of a problem that have a vote: of the commonest of its limits, one a solver."""
+    limits = {run.limit for run in mine if run.limit is not None}
+    limit = max(limits, key=lambda value: (common[value], -value), default=None)
+    # the last version of a solver has the vote
+    last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
+    # an accepted solution has no limit and no vote
+    return [run for run in last.values() if run.limit and run.status != UNSUITABLE]
 
 
 def when(run: Run) -> float:

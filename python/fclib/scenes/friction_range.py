@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -28,6 +29,8 @@ class FrictionRange:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "ladder"
     problems: ClassVar[int] = len(COEFFICIENTS)
+    # parameters of a small wall, which is solved quickly
+    small: ClassVar[Mapping[str, Any]] = {"contacts": 40}
 
     contacts: int = parameter(250, "1", "number of contacts, about; at least 4")
     push: float = parameter(0.5, "1", "impulse on the top course, in weights of all blocks")

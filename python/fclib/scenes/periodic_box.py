@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -32,6 +33,8 @@ class PeriodicBox(Published):
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 220
+    # parameters of a small scene, which is simulated quickly
+    small: ClassVar[Mapping[str, Any]] = {"polyhedra": 18, "shapes": 5, "period": 19.0}
 
     polyhedra: int = parameter(100, "1", "number of polyhedra, at least 1")
     shapes: int = parameter(25, "1", "polyhedra that differ, at least 1")

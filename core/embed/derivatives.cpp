@@ -208,6 +208,253 @@ void PivotedFactors::solve(bool transposed, double* x) {
   for (std::size_t i = 0; i < n_; ++i) x[out[i]] = y_[i];
 }
 
+/// Coulomb's law at a solution.
+enum class Law : std::uint8_t { open, stick, slide };
+
+struct Status {
+  Law law;
+  bool degenerate;  // on a border between two of them
+  double sliding;   // ||z_T||, z = r - rho u
+  double speed;     // ||u_T||
+};
+
+/// Of a contact; `longest` is the largest ||z|| of the problem.
+template <int D>
+Status status_of(const double* z, const double* u, double mu, double longest) {
+  double sliding = 0;
+  double speed = 0;
+  for (int k = 1; k < D; ++k) {
+    sliding += z[k] * z[k];
+    speed += u[k] * u[k];
+  }
+  sliding = std::sqrt(sliding);
+  speed = std::sqrt(speed);
+  const double excess = sliding - mu * z[0];
+  const bool open = z[0] <= 0;
+  const bool slides = excess > 0 || mu == 0;
+  const bool degenerate =
+      std::abs(z[0]) <= border * longest || (!open && std::abs(excess) <= border * longest);
+  return {open ? Law::open : slides ? Law::slide : Law::stick, degenerate, sliding, speed};
+}
+
+/// The mean of the diagonal of a contact's block; rows are m entries long.
+template <int D>
+double size_of(const double* block, std::size_t m) {
+  double size = 0;
+  for (std::size_t k = 0; k < D; ++k) size += block[(m + 1) * k] / D;
+  return size;
+}
+
+/// A problem of one contact that has a well-conditioned S: dr = G (dq + dW r) + h dmu, and G and h
+/// follow from the law in closed form.
+template <int D>
+class OneContact {
+ public:
+  /// Returns false if the problem is for Point: the data may not be valid, or S be singular.
+  bool take(const double* W, const double* q, const double* mu, const double* r);
+
+  [[nodiscard]] static bool unique() { return true; }
+  [[nodiscard]] bool degenerate(std::int64_t) const { return degenerate_; }
+
+  void adjoint(const double* by_r, const double* by_u, double* by_W, double* by_q,
+               double* by_mu) const;
+  void forward(const double* dW, const double* dq, const double* dmu, double* dr, double* du) const;
+  void sensitivities(double* by_q, double* by_mu) const;
+
+ private:
+  /// S is well conditioned if its determinant is at least this part of its columns' lengths.
+  static constexpr double part = 1e-3;
+
+  bool stick(double rho);
+  bool slide(double rho, double mu, double speed, const double* u);
+
+  const double* W_ = nullptr;
+  const double* r_ = nullptr;
+  bool degenerate_ = false;
+  double G_[D][D];
+  double h_[D];
+};
+
+template <int D>
+bool OneContact<D>::take(const double* W, const double* q, const double* mu, const double* r) {
+  W_ = W;
+  r_ = r;
+  double u[D];
+  double z[D];
+  double sum = *mu * 0.0;  // zero, or NaN; what is not finite in W, q or r is so in u
+  for (int i = 0; i < D; ++i) {
+    u[i] = q[i];
+    for (int j = 0; j < D; ++j) u[i] += W[D * i + j] * r[j];
+    sum += u[i] * 0.0;
+  }
+  const double size = size_of<D>(W, D);
+  if (sum != 0 || !(*mu >= 0) || !(size > 0)) return false;
+  const double rho = 1 / size;
+  double square = 0;
+  for (int i = 0; i < D; ++i) {
+    z[i] = r[i] - rho * u[i];
+    square += z[i] * z[i];
+  }
+  const Status status = status_of<D>(z, u, *mu, std::sqrt(square));
+  degenerate_ = status.degenerate;
+  if (status.law == Law::slide) return slide(rho, *mu, status.speed, u);
+  for (int i = 0; i < D; ++i) {
+    h_[i] = 0;
+    for (int j = 0; j < D; ++j) G_[i][j] = 0;
+  }
+  return status.law == Law::open || stick(rho);
+}
+
+/// du = 0: G = -W^-1, by the cofactors of S = rho W.
+template <int D>
+bool OneContact<D>::stick(double rho) {
+  double S[D][D];
+  double lengths = 1;  // squared
+  for (int j = 0; j < D; ++j) {
+    double square = 0;
+    for (int i = 0; i < D; ++i) {
+      S[i][j] = rho * W_[D * i + j];
+      square += S[i][j] * S[i][j];
+    }
+    lengths *= square;
+  }
+  if constexpr (D == 2) {
+    G_[0][0] = S[1][1];
+    G_[0][1] = -S[0][1];
+    G_[1][0] = -S[1][0];
+    G_[1][1] = S[0][0];
+  } else {
+    for (int i = 0; i < 3; ++i) {
+      const int i1 = (i + 1) % 3;
+      const int i2 = (i + 2) % 3;
+      for (int j = 0; j < 3; ++j) {
+        const int j1 = (j + 1) % 3;
+        const int j2 = (j + 2) % 3;
+        G_[j][i] = S[i1][j1] * S[i2][j2] - S[i1][j2] * S[i2][j1];
+      }
+    }
+  }
+  double determinant = 0;
+  for (int j = 0; j < D; ++j) determinant += S[0][j] * G_[j][0];
+  if (!(determinant * determinant > part * part * lengths)) return false;
+  const double scale = -rho / determinant;
+  for (auto& row : G_) {
+    for (double& entry : row) entry *= scale;
+  }
+  return true;
+}
+
+/// With the unit vectors n, t of sliding and s across it, dr = a (n - mu t) + b s - r_N t dmu, and
+///
+///   rho du_N = 0,   b + c du_s = 0,   c = mu r_N / ||u_T||
+///
+/// are equations for a and b, K (a, b) = (-rho x_N, -c x_s), where x is du at a = b = 0. Without a
+/// speed t is not finite, and no comparison holds.
+template <int D>
+bool OneContact<D>::slide(double rho, double mu, double speed, const double* u) {
+  const double* const W = W_;
+  double t[D]{};
+  for (int i = 1; i < D; ++i) t[i] = u[i] / speed;
+  double Wt[D];
+  for (int i = 0; i < D; ++i) {
+    Wt[i] = W[D * i + 1] * t[1];
+    if constexpr (D == 3) Wt[i] += W[D * i + 2] * t[2];
+  }
+  const double K_aa = rho * (W[0] - mu * Wt[0]);
+  // the square of the length of a column of S
+  double by_n = rho * W[0] * rho * W[0] + mu * mu;
+  double by_t = rho * Wt[0] * rho * Wt[0] + 1;
+  if constexpr (D == 2) {
+    if (!(K_aa * K_aa > part * part * by_n * by_t)) return false;
+    G_[0][0] = -rho / K_aa;
+    G_[0][1] = G_[1][1] = 0;
+    G_[1][0] = -mu * t[1] * G_[0][0];
+  } else {
+    const double s[] = {0, -t[2], t[1]};
+    const double c = mu * r_[0] / speed;
+    double Ws[3];
+    for (int i = 0; i < 3; ++i) Ws[i] = W[3 * i + 1] * s[1] + W[3 * i + 2] * s[2];
+    const double sWn = W[3] * s[1] + W[6] * s[2];
+    const double sWt = Wt[1] * s[1] + Wt[2] * s[2];
+    const double K_ab = rho * Ws[0];
+    const double K_ba = c * (sWn - mu * sWt);
+    const double K_bb = 1 + c * (Ws[1] * s[1] + Ws[2] * s[2]);
+    const double determinant = K_aa * K_bb - K_ab * K_ba;
+    by_n += c * sWn * c * sWn;
+    // of both tangents, the mean: the columns along the axes are not longer together
+    by_t = (by_t + c * sWt * c * sWt + K_ab * K_ab + K_bb * K_bb) / 2;
+    if (!(determinant * determinant > part * part * by_n * by_t * by_t)) return false;
+    const double inverse = 1 / determinant;
+    const double a_n = -K_bb * rho * inverse;
+    const double a_s = K_ab * c * inverse;
+    const double b_n = K_ba * rho * inverse;
+    const double b_s = -K_aa * c * inverse;
+    G_[0][0] = a_n;
+    for (int j = 1; j < 3; ++j) G_[0][j] = a_s * s[j];
+    for (int i = 1; i < 3; ++i) {
+      G_[i][0] = b_n * s[i] - a_n * mu * t[i];
+      const double across = b_s * s[i] - a_s * mu * t[i];
+      for (int j = 1; j < 3; ++j) G_[i][j] = across * s[j];
+    }
+  }
+  for (int i = 0; i < D; ++i) {
+    double sum = t[i];
+    for (int j = 0; j < D; ++j) sum += G_[i][j] * Wt[j];
+    h_[i] = -r_[0] * sum;
+  }
+  return true;
+}
+
+template <int D>
+void OneContact<D>::adjoint(const double* by_r, const double* by_u, double* by_W, double* by_q,
+                            double* by_mu) const {
+  double x[D];
+  double change[D];
+  for (int i = 0; i < D; ++i) {
+    x[i] = by_r != nullptr ? by_r[i] : 0.0;
+    change[i] = by_u != nullptr ? by_u[i] : 0.0;
+    for (int j = 0; j < D && by_u != nullptr; ++j) x[i] += W_[D * j + i] * by_u[j];
+  }
+  double sum = 0;
+  for (int i = 0; i < D; ++i) {
+    for (int j = 0; j < D; ++j) change[j] += G_[i][j] * x[i];
+    sum += h_[i] * x[i];
+  }
+  if (by_q != nullptr) std::copy_n(change, D, by_q);
+  if (by_mu != nullptr) *by_mu = sum;
+  if (by_W == nullptr) return;
+  for (int i = 0; i < D; ++i) {
+    for (int j = 0; j < D; ++j) by_W[D * i + j] = change[i] * r_[j];
+  }
+}
+
+template <int D>
+void OneContact<D>::forward(const double* dW, const double* dq, const double* dmu, double* dr,
+                            double* du) const {
+  double x[D];
+  double y[D];  // the change of u at the same reactions
+  for (int i = 0; i < D; ++i) {
+    y[i] = dq != nullptr ? dq[i] : 0.0;
+    for (int j = 0; j < D && dW != nullptr; ++j) y[i] += dW[D * i + j] * r_[j];
+  }
+  for (int i = 0; i < D; ++i) {
+    x[i] = dmu != nullptr ? h_[i] * *dmu : 0.0;
+    for (int j = 0; j < D; ++j) x[i] += G_[i][j] * y[j];
+  }
+  if (dr != nullptr) std::copy_n(x, D, dr);
+  if (du == nullptr) return;
+  for (int i = 0; i < D; ++i) {
+    du[i] = y[i];
+    for (int j = 0; j < D; ++j) du[i] += W_[D * i + j] * x[j];
+  }
+}
+
+template <int D>
+void OneContact<D>::sensitivities(double* by_q, double* by_mu) const {
+  if (by_q != nullptr) std::copy_n(&G_[0][0], D * D, by_q);
+  if (by_mu != nullptr) std::copy_n(h_, D, by_mu);
+}
+
 /// One problem at its solution.
 template <int D>
 class Point {
@@ -225,8 +472,6 @@ class Point {
   void sensitivities(double* by_q, double* by_mu);
 
  private:
-  enum class Law : std::uint8_t { open, stick, slide };
-
   /// y = A x or A^T x of contact a; A is the law's matrix before du.
   void by_velocity(std::size_t a, bool transposed, const double* x, double* y) const {
     const double* const block = &A_[D * D * a];
@@ -288,10 +533,8 @@ bool Point<D>::take(std::int64_t nc, const double* W, const double* q, const dou
   // the statuses
   double most = 0;
   for (std::size_t a = 0; a < count; ++a) {
-    double size = 0;
-    for (std::size_t k = D * a; k < D * (a + 1); ++k) size += W[m * k + k] / D;
-    rho_[a] = size;
-    most = std::max(most, size);
+    rho_[a] = size_of<D>(W + (m + 1) * D * a, m);
+    most = std::max(most, rho_[a]);
   }
   double longest = 0;
   for (std::size_t a = 0; a < count; ++a) {
@@ -310,24 +553,15 @@ bool Point<D>::take(std::int64_t nc, const double* W, const double* q, const dou
   kept_.clear();
   for (std::size_t a = 0; a < count; ++a) {
     const std::size_t at = D * a;
-    double sliding = 0;
-    double speed = 0;
-    for (std::size_t k = at + 1; k < at + D; ++k) {
-      sliding += z_[k] * z_[k];
-      speed += u_[k] * u_[k];
-    }
-    sliding = std::sqrt(sliding);
-    speed = std::sqrt(speed);
-    const bool open = z_[at] <= 0;
-    const bool slides = !open && (sliding > mu[a] * z_[at] || mu[a] == 0);
-    degenerate_[a] = std::abs(z_[at]) <= border * longest ||
-                     (!open && std::abs(sliding - mu[a] * z_[at]) <= border * longest);
-    law_[a] = open ? Law::open : slides ? Law::slide : Law::stick;
-    if (open) continue;
+    const Status status = status_of<D>(&z_[at], &u_[at], mu[a], longest);
+    const double speed = status.speed;
+    degenerate_[a] = status.degenerate;
+    law_[a] = status.law;
+    if (status.law == Law::open) continue;
     for (std::size_t k = at; k < at + D; ++k) kept_.push_back(k);
     double* const A = &A_[D * D * a];
     double* const B = &B_[D * D * a];
-    if (!slides) {
+    if (status.law == Law::stick) {
       for (int k = 0; k < D; ++k) A[D * k + k] = rho_[a];
       continue;
     }
@@ -335,7 +569,8 @@ bool Point<D>::take(std::int64_t nc, const double* W, const double* q, const dou
     for (int k = 0; k < D - 1; ++k) {
       // on the border to stick the reaction gives the direction of sliding
       const std::size_t place = at + 1 + static_cast<std::size_t>(k);
-      t[k] = speed > 0 ? u_[place] / speed : -z_[place] / (sliding != 0 ? sliding : 1.0);
+      t[k] =
+          speed > 0 ? u_[place] / speed : -z_[place] / (status.sliding != 0 ? status.sliding : 1.0);
     }
     A[0] = rho_[a];
     const double turn = speed > 0 ? mu[a] * r[at] / speed : 0.0;
@@ -528,7 +763,9 @@ void run(const SolvedBatch& batch, const DerivativeSettings& settings, const One
   std::mutex mutex;
   std::exception_ptr failure;
   const auto work = [&](int worker) {
-    thread_local Point<D> point;
+    thread_local Point<D> memory;
+    Point<D>& point = memory;
+    OneContact<D> single;
     double last_poll = worker == 0 && settings.poll ? now({}) : 0.0;
     try {
       for (;;) {
@@ -547,13 +784,26 @@ void run(const SolvedBatch& batch, const DerivativeSettings& settings, const One
         }
         for (std::int64_t k = first; k < std::min(first + chunk, batch.count); ++k) {
           const std::int64_t nc = contacts(k);
-          const bool good = !stopped && point.take(nc, batch.W + place.W, batch.q + place.q,
-                                                   batch.mu + place.mu, batch.r + place.q);
-          if (batch.unique != nullptr) batch.unique[k] = good && point.unique() ? 1 : 0;
-          for (std::int64_t a = 0; batch.degenerate != nullptr && a < nc; ++a) {
-            batch.degenerate[place.mu + a] = good && point.degenerate(a) ? 1 : 0;
+          const double* const W = batch.W + place.W;
+          const double* const q = batch.q + place.q;
+          const double* const mu = batch.mu + place.mu;
+          const double* const r = batch.r + place.q;
+          const auto found = [&](const auto* solved) {
+            if (batch.unique != nullptr) {
+              batch.unique[k] = solved != nullptr && solved->unique() ? 1 : 0;
+            }
+            for (std::int64_t a = 0; batch.degenerate != nullptr && a < nc; ++a) {
+              batch.degenerate[place.mu + a] = solved != nullptr && solved->degenerate(a) ? 1 : 0;
+            }
+          };
+          if (nc == 1 && !stopped && single.take(W, q, mu, r)) {
+            found(&single);
+            one(&single, nc, place.W, place.q, place.mu);
+          } else {
+            Point<D>* const solved = !stopped && point.take(nc, W, q, mu, r) ? &point : nullptr;
+            found(solved);
+            one(solved, nc, place.W, place.q, place.mu);
           }
-          one(good ? &point : nullptr, nc, place.W, place.q, place.mu);
           advance(place, nc);
         }
       }

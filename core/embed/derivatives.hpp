@@ -14,6 +14,8 @@
 //
 // The factors that solved the problem are of another matrix: they belong to the iterate before the
 // last, and have a proximal term. The factors here serve all right-hand sides of a problem.
+//
+// A problem of one contact whose S is well conditioned has its derivatives in closed form.
 #pragma once
 
 #include <cstdint>

@@ -1,14 +1,17 @@
-"""Many small problems: fclib.solve_batch, a loop of fclib.solve, Pinocchio and MuJoCo, in one run.
+"""Many small problems: fclib.solve_batch and its derivatives, a loop, Pinocchio and MuJoCo.
 
     python -m workshop.tables.batch [--count 2000] [--repeats 3] [--threads 2] [--results NAME]
 
-The systems are MuJoCo's own: a box (or two) thrown on a plane, W = J M^-1 J^T and q = J v of its
+The systems are MuJoCo's own: a box (or some) thrown on a plane, W = J M^-1 J^T and q = J v of its
 contacts, impulses of one step. Every solver gets the same W, q and mu in one process, one thread;
 the CPU time is that of the whole call from Python, what each takes to build its own objects left
 out. The error is `Merit.error` of what it returns. Peers run twice: to their tightest tolerance
 with many iterations, and within the limits that they come with. MuJoCo solves its own problem from
 its own constraint matrices, made as stiff as it allows (solimp 0.9999, a velocity that one step
 stops): its law is a convex relaxation, so that its error is what the relaxation costs.
+
+The derivatives (fclib.vjp_batch with weights of r, fclib.jvp_batch with changes of q) take turns
+with fclib.solve_batch, on one thread: a row has the ratio of their least CPU times.
 """
 
 from __future__ import annotations
@@ -41,7 +44,11 @@ SCENES = {
     "four (a box)": BOX.format(z=0.08, half=0.08, mass=1),
     "eight (two boxes)": BOX.format(z=0.08, half=0.08, mass=1)
     + BOX.format(z=0.22, half=0.06, mass=0.5),
+    "sixteen (four boxes)": "".join(
+        BOX.format(z=0.05 + 0.1 * k, half=0.05, mass=1 / (k + 1)) for k in range(4)
+    ),
 }
+DERIVATIVE_ROUNDS = 15
 
 
 class Systems:
@@ -146,10 +153,15 @@ def by_pinocchio(
     return 1e-9 * spent, reactions
 
 
-HEADS = ("contacts", "solver", "CPU [us]", "median error", "worst error", "at most 1e-8 [%]")
+HEADS = (
+    "contacts", "solver", "CPU [us]", "median error", "worst error", "at most 1e-8 [%]",
+    "vjp / solve", "jvp / solve",
+)  # fmt: skip
 
 
-def row(contacts: str, name: str, spent: float, count: int, error: Floats) -> dict[str, str]:
+def row(
+    contacts: str, name: str, spent: float, count: int, error: Floats, ratios: tuple[str, str]
+) -> dict[str, str]:
     """A line of the table."""
     cells = (
         contacts,
@@ -158,6 +170,7 @@ def row(contacts: str, name: str, spent: float, count: int, error: Floats) -> di
         f"{np.median(error):.0e}",
         f"{error.max():.0e}",
         f"{100 * np.count_nonzero(error <= 1e-8) / len(error):.0f}",
+        *ratios,
     )
     print(f"| {' | '.join(cells)} |", flush=True)
     return dict(zip(HEADS, cells, strict=True))
@@ -180,6 +193,25 @@ def gain(systems: Systems, threads: int) -> tuple[float, float]:
             walls[number] = min(walls[number], time.perf_counter() - start)
             spent[number] = min(spent[number], time.process_time() - cpu)
     return walls[1] / walls[threads], spent[threads] / spent[1]
+
+
+def of_derivatives(systems: Systems) -> tuple[str, str]:
+    """How many times the CPU time of solve_batch vjp_batch and jvp_batch take."""
+    arrays = (systems.W, systems.q, systems.mu)
+    solution = fclib.solve_batch(*arrays, tol=1e-12).r
+    ones = np.ones_like(solution)
+    least: dict[Callable[[], object], float] = {
+        lambda: fclib.solve_batch(*arrays): np.inf,
+        lambda: fclib.vjp_batch(*arrays, solution, r=ones): np.inf,
+        lambda: fclib.jvp_batch(*arrays, solution, dq=ones): np.inf,
+    }
+    for _ in range(DERIVATIVE_ROUNDS):
+        for run in least:
+            start = time.process_time_ns()
+            run()
+            least[run] = min(least[run], time.process_time_ns() - start)
+    solve, vjp, jvp = least.values()
+    return f"{vjp / solve:.2f}", f"{jvp / solve:.2f}"
 
 
 def runs_of(
@@ -232,7 +264,8 @@ def main() -> None:
         for name, number, run in runs_of(systems, arguments.count):
             found = [run() for _ in range(arguments.repeats)]
             spent = min(time for time, _ in found)
-            rows.append(row(title, name, spent, number, errors(systems, found[-1][1])))
+            ratios = of_derivatives(systems) if name == "fclib.solve_batch" else ("", "")
+            rows.append(row(title, name, spent, number, errors(systems, found[-1][1]), ratios))
         faster, dearer = gain(systems, arguments.threads)
         gains.append(f"{faster:.2f} for {title} ({dearer:.2f} times the CPU time)")
     words = f"{arguments.threads} threads solve so many times as many a second: {', '.join(gains)}."
@@ -243,7 +276,8 @@ def main() -> None:
             rows,
             title="Small problems, CPU time of one and `Merit.error`",
             note=f"{arguments.count} problems of a kind, the least of {arguments.repeats} runs; "
-            f"tolerance 1e-8. {words}",
+            f"of the derivatives {DERIVATIVE_ROUNDS}, in turn with the solver; tolerance 1e-8. "
+            f"{words}",
         )
 
 

@@ -5,8 +5,8 @@
 recorded_steps.py, record_simulators.py and judged_engines.py record its steps. STEP is the time
 step; SCALE is Bullet's, whose margins are made for edges of 1 m. BOXES is a list in JSON of half
 edges, mass, place and velocity: of the centre, or with the angular one behind it. A box with a
-"press" [N] is on a slide along x, and pressed that way. Without such boxes the integrator is the one
-that keeps M and H; with them it is the one that has joints.
+"press" [N] is on a slide along x, and pressed that way. Without such boxes the integrator is that
+which keeps M and H; with them it is that which has joints.
 """
 
 from __future__ import annotations

@@ -232,8 +232,8 @@ def parts_of(
     """
     n, none = len(v), np.zeros(3)
     known = p.getDynamicsInfo(body, BASE, **options)
-    # PyBullet gives the frame of the inertia
-    centre, turned = p.getBasePositionAndOrientation(body, **options)
+    # Bullet gives the frame of the inertia
+    centre, attitude = p.getBasePositionAndOrientation(body, **options)
     move, turn = np.zeros((3, n)), np.zeros((3, n))
     if (body, BASE) in place:
         k = place[body, BASE]
@@ -241,7 +241,7 @@ def parts_of(
     parts = {
         (body, BASE): Part(
             mass=known[0],
-            inertia=inertia(p, known[2], turned),
+            inertia=inertia(p, known[2], attitude),
             centre=np.array(centre),
             move=move,
             turn=turn,
@@ -255,50 +255,46 @@ def parts_of(
         kind, before = told[2], parts[body, told[16]]
         known = p.getDynamicsInfo(body, joint, **options)
         state = p.getLinkState(body, joint, 0, True, **options)
-        centre, pivot = np.array(state[0]), np.array(state[4])
-        axis = np.reshape(p.getMatrixFromQuaternion(state[1]), (3, 3)) @ told[13]
-        turn, angular = before.turn.copy(), before.angular
-        if kind == p.JOINT_REVOLUTE:
-            # about the pivot, which moves with the part before
+        # a revolute joint turns the link about the origin of its frame
+        pivot = np.array(state[4] if kind == p.JOINT_REVOLUTE else state[0])
+        move, turn = before.moved(pivot), before.turn.copy()
+        linear, angular = before.accelerated(pivot), before.angular
+        if kind in (p.JOINT_REVOLUTE, p.JOINT_PRISMATIC):
             k = place[body, joint]
-            turn[:, k] += axis
-            angular = angular + np.cross(before.spin, axis * v[k])
-            held, moved = before.moved(pivot), before.accelerated(pivot)
-        elif kind == p.JOINT_PRISMATIC:
-            k = place[body, joint]
-            held, moved = before.moved(centre), before.accelerated(centre)
-            held[:, k] += axis
-            moved = moved + 2 * np.cross(before.spin, axis * v[k])
-            pivot = centre
-        elif kind == p.JOINT_FIXED:
-            held, moved, pivot = before.moved(centre), before.accelerated(centre), centre
-        else:
+            # Bullet gives the axis in the frame of the inertia
+            axis = np.reshape(p.getMatrixFromQuaternion(state[1]), (3, 3)) @ told[13]
+            turned = np.cross(before.spin, axis * v[k])
+            if kind == p.JOINT_REVOLUTE:
+                turn[:, k] += axis
+                angular = angular + turned
+            else:
+                move[:, k] += axis
+                linear = linear + 2 * turned
+        elif kind != p.JOINT_FIXED:
             name = told[1].decode()
             raise SetupError(
                 f"body {body}: joint {name} is not revolute, prismatic or fixed, which are recorded"
             )
-        anchored = Part(
+        held = Part(
             mass=known[0],
             inertia=inertia(p, known[2], state[1]),
             centre=pivot,
-            move=held,
+            move=move,
             turn=turn,
             spin=turn @ v,
-            linear=moved,
+            linear=linear,
             angular=angular,
         )
+        centre = np.array(state[0])
         parts[body, joint] = replace(
-            anchored,
-            centre=centre,
-            move=anchored.moved(centre),
-            linear=anchored.accelerated(centre),
+            held, centre=centre, move=held.moved(centre), linear=held.accelerated(centre)
         )
     return parts
 
 
-def inertia(p: Any, principal: Any, turned: Any) -> Vector:
-    """(3 x 3) the inertia in the world, of its diagonal in a frame, whose quaternion is given."""
-    turn = np.reshape(p.getMatrixFromQuaternion(turned), (3, 3))
+def inertia(p: Any, principal: Any, attitude: Any) -> Vector:
+    """(3 x 3) the inertia in the world, of its diagonal in a frame and the frame's quaternion."""
+    turn = np.reshape(p.getMatrixFromQuaternion(attitude), (3, 3))
     return np.asarray(turn @ np.diag(principal) @ turn.T)
 
 

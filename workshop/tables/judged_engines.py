@@ -266,10 +266,10 @@ def bullets(scene: str, steps: int) -> Iterator[Any]:
             bodies[-1], 0, bullet.VELOCITY_CONTROL, targetVelocity=FASTEST, force=PRESS
         )
     for body in bodies:
-        # coefficients multiply
-        known = {"linearDamping": 0, "angularDamping": 0, "lateralFriction": MU**0.5}
+        bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+        # coefficients multiply; with a damping in the same call Bullet changes the base, not a link
         for link in range(-1, bullet.getNumJoints(body)):
-            bullet.changeDynamics(body, link, **known)
+            bullet.changeDynamics(body, link, lateralFriction=MU**0.5)
     for _ in range(steps):
         yield recorders.pybullet(client)
     bullet.disconnect()

@@ -560,6 +560,135 @@ def test_bullets_reaction_gives_its_velocity() -> None:
         bullet.disconnect(client)
 
 
+def tree_of_bullet(bullet: Any, client: int, mass: float) -> int:
+    """A body of a base (fixed without a mass) and links that turn, slide and are fixed."""
+    options = {"physicsClientId": client}
+    random = np.random.default_rng(0)
+
+    def vectors(size: float, width: int = 3) -> list[list[float]]:
+        found = random.normal(size=(4, width))
+        if width == 4:
+            found /= np.linalg.norm(found, axis=1)[:, None]
+        return (size * found).tolist()
+
+    shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[0.05, 0.1, 0.15], **options)
+    kinds = (
+        bullet.JOINT_REVOLUTE,
+        bullet.JOINT_PRISMATIC,
+        bullet.JOINT_FIXED,
+        bullet.JOINT_REVOLUTE,
+    )
+    body: int = bullet.createMultiBody(
+        mass,
+        shape,
+        basePosition=[0.1, 0.2, 1.2],
+        baseOrientation=vectors(1, 4)[0],
+        baseInertialFramePosition=[0.03, 0.02, 0.01],
+        baseInertialFrameOrientation=vectors(1, 4)[0],
+        linkMasses=[1, 2, 1.5, 0.7],
+        linkCollisionShapeIndices=[shape] * 4,
+        linkVisualShapeIndices=[-1] * 4,
+        linkPositions=vectors(0.3),
+        linkOrientations=vectors(1, 4),
+        linkInertialFramePositions=vectors(0.1),
+        linkInertialFrameOrientations=vectors(1, 4),
+        linkParentIndices=[0, 1, 1, 3],
+        linkJointTypes=kinds,
+        linkJointAxis=np.eye(3)[[0, 1, 2, 1]].tolist(),
+        **options,
+    )
+    bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0, **options)
+    for joint in (0, 1, 3):
+        bullet.setJointMotorControl2(
+            body, joint, bullet.VELOCITY_CONTROL, targetVelocity=3, force=0.2 * joint, **options
+        )
+        bullet.resetJointState(body, joint, 0.3 + joint, 1 - joint, **options)
+    if mass:
+        bullet.resetBaseVelocity(body, [0.1, 0.2, 0.3], [1, 2, 3], **options)
+    return body
+
+
+@pytest.mark.parametrize("mass", [0, 3])
+def test_bullets_joints_give_the_velocity(mass: float) -> None:
+    bullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
+    ends, contacts = [], 0
+    for recorded in (True, False):
+        client = bullet.connect(bullet.DIRECT)
+        options = {"physicsClientId": client}
+        try:
+            bullet.setTimeStep(1e-3, **options)
+            bullet.setGravity(0, 0, -9.81, **options)
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **options)
+            bullet.createMultiBody(0, plane, **options)
+            body = tree_of_bullet(bullet, client, mass)
+            joints = (0, 1, 3)
+            q = [bullet.getJointState(body, joint, **options)[0] for joint in joints]
+            own = np.array(bullet.calculateMassMatrix(body, q, **options))
+            for number in range(400):
+                if not recorded:
+                    bullet.stepSimulation(**options)
+                    continue
+                step = recorders.pybullet(client)
+                assert step.problem.n == 3 + 6 * bool(mass)
+                assert step.mismatch is not None
+                # axes come to Bullet in single precision
+                assert step.mismatch < 1e-6 * max(1, np.abs(step.velocity).max())
+                contacts += step.problem.nc
+                if number == 0 and not mass:
+                    # Bullet's own is that of the frame of the base if the base moves
+                    np.testing.assert_allclose(dense(step.problem.M), own, atol=1e-6)
+            ends.append([bullet.getJointState(body, joint, **options)[:2] for joint in joints])
+        finally:
+            bullet.disconnect(client)
+    assert contacts > 50 or not mass
+    assert "found for the motors" in step.notes[1]
+    # to record a step changes nothing
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
+
+
+PENDULUM = """
+<robot name="pendulum">
+  <link name="post"/>
+  <link name="arm"><inertial><origin xyz="0 0 -0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.015" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="elbow" type="{kind}"><parent link="post"/><child link="arm"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><dynamics damping="0.5" friction="0"/>
+    <limit lower="-0.4" upper="0.4" effort="1" velocity="1"/></joint>
+</robot>
+"""
+
+
+def test_bullets_dampers_are_recorded_and_other_joints_named(tmp_path: Path) -> None:
+    bullet = pytest.importorskip("pybullet", reason="PyBullet is not installed")
+    client = bullet.connect(bullet.DIRECT)
+    options = {"physicsClientId": client}
+
+    def pendulum(kind: str, rate: float = 0.0) -> int:
+        bullet.resetSimulation(**options)
+        bullet.setGravity(0, 0, -9.81, **options)
+        path = tmp_path / f"{kind}.urdf"
+        path.write_text(PENDULUM.format(kind=kind), encoding="utf-8")
+        body: int = bullet.loadURDF(str(path), useFixedBase=True, **options)
+        for link in (-1, 0):
+            bullet.changeDynamics(body, link, linearDamping=0, angularDamping=0, **options)
+        if kind == "revolute":
+            bullet.resetJointState(body, 0, 0.3, rate, **options)
+            bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, force=0, **options)
+        return body
+
+    try:
+        pendulum("revolute", -2.0)
+        assert recorders.pybullet(client).mismatch == pytest.approx(0, abs=1e-6)
+        body = pendulum("revolute", 40.0)
+        with pytest.raises(ValueError, match=f"body {body}: joint elbow is at its limit"):
+            recorders.pybullet(client)
+        body = pendulum("spherical")
+        with pytest.raises(recorders.SetupError, match=f"body {body}: joint elbow is not revolute"):
+            recorders.pybullet(client)
+    finally:
+        bullet.disconnect(client)
+
+
 def pinocchios_box(height: float, **options: Any) -> Any:
     """A step of a box of 0.2 m that slides above a floor, z its middle [m]."""
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")
@@ -1038,6 +1167,49 @@ def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
         (guess,) = fclib.read_guesses(file)
         assert fclib.merit(problem, guess).error < 1e-6
         assert fclib.solve(problem).converged
+
+
+MIXED = ("MoreauJeanOSI", "SICONOS_GENERIC_MECHANICAL_NSGS")
+# the first ball is on a slide, which lets it turn about no axis
+SLIDE = """        io.add_joint(
+            "slide", "ball0", points=None, axes=[[1, 0, 0]], joint_class="PrismaticJointR"{more}
+        )
+        io.add_Newton"""
+
+
+def test_siconos_joints_are_bilateral_rows(tmp_path: Path) -> None:
+    needs_siconos_mechanics()
+    script = tmp_path / "slide.py"
+    text = SICONOS.replace("        io.add_Newton", SLIDE.format(more=""))
+    script.write_text(text, encoding="utf-8")
+    steps = list(recorders.siconos(script, arguments=(*MIXED, "12")))
+    assert len(steps) == 12
+    errors = []
+    for recorded in steps:
+        problem: Any = recorded.problem
+        assert (problem.kind, problem.p) == ("local", 5)
+        assert set(recorded.fields) == {"W", "V", "R", "q", "s", "mu"}
+        assert recorded.mismatch is not None
+        assert recorded.mismatch < 1e-12
+        assert recorded.guess is not None
+        held = problem.V.T @ recorded.guess.r + problem.R @ recorded.guess.l + problem.s
+        np.testing.assert_allclose(held, 0, atol=1e-9)
+        errors.append(fclib.merit(problem, recorded.guess).error)
+        assert fclib.solve(problem, tol=1e-10).converged
+    # where it converges
+    assert np.median(errors) < 1e-6
+    # the ball comes at 3 m/s and does not roll, until it runs into the next one
+    first = np.reshape(steps[0].velocity, (-1, 3))
+    assert np.linalg.norm(first[:, 1:], axis=1).max() == pytest.approx(3, rel=0.02)
+
+
+def test_stops_of_siconos_joints_are_refused(tmp_path: Path) -> None:
+    needs_siconos_mechanics()
+    script = tmp_path / "stop.py"
+    stop = SLIDE.format(more=", stops=[[0, 0.001, -1]]")
+    script.write_text(SICONOS.replace("        io.add_Newton", stop), encoding="utf-8")
+    with pytest.raises(recorders.SetupError, match="a joint has a stop, which is not recorded"):
+        list(recorders.siconos(script, arguments=(*MIXED, "12")))
 
 
 @pytest.mark.parametrize("scheme", [GLOBAL, LOCAL])

@@ -5,9 +5,10 @@
 
 PYTHON has fclib, MuJoCo, MuJoCo Warp, Drake, Genesis, Newton and PyBullet; Siconos has an
 interpreter of its own (fclib.external.siconos). Engines that are not installed are left out, and
-said, and those whose joints are not recorded of the gripper. Each engine has its default settings,
-but for the scene, the time step of 2 ms, Coulomb's coefficient and the damping of velocities, which
-is 0; Genesis has elliptic cones. The criteria are those of `fclib judge`.
+said. Each engine has its default settings, but for the scene, the time step of 2 ms, Coulomb's
+coefficient and the damping of velocities, which is 0; Genesis has elliptic cones. PyBullet presses
+the gripper by motors whose force is limited: the limit is the force. Siconos has another integrator
+for the gripper, that of joints. The criteria are those of `fclib judge`.
 """
 
 from __future__ import annotations
@@ -54,29 +55,16 @@ SCENES = {
     "pile": [Box(CUBE, 1.0 + i, (0.06 * i, 0, 0.105 + 0.21 * i)) for i in range(6)],
     "gripper": [Box(CUBE, 2.0, (0, 0, 1))],
 }
-# boxes on slides along x, each pressed towards x = 0 by PRESS
+# boxes on slides along x, each pressed towards x = 0 by PRESS: they hold a box in the air
 PADS = {
     "gripper": [Box((0.05, 0.1, 0.1), 1.0, (-0.15, 0, 1)), Box((0.05, 0.1, 0.1), 1.0, (0.15, 0, 1))]
 }
 PRESS = 40.0  # [N]
-# two pads on slides press a box by 40 N each, and hold it in the air
-GRIPPER = """
-<mujoco><option timestep="0.002" cone="elliptic"/>
-  <worldbody>
-    <body name="box" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" mass="2"/></body>
-    <body name="left" pos="-.15 0 1"><joint name="left" type="slide" axis="1 0 0"/>
-      <geom type="box" size=".05 .1 .1" mass="1"/></body>
-    <body name="right" pos=".15 0 1"><joint name="right" type="slide" axis="-1 0 0"/>
-      <geom type="box" size=".05 .1 .1" mass="1"/></body>
-  </worldbody>
-  <actuator><motor joint="left"/><motor joint="right"/></actuator>
-  <keyframe><key name="start" qpos="0 0 1 1 0 0 0 0 0" ctrl="40 40"/></keyframe>
-</mujoco>
-"""
+FASTEST = 10.0  # speed that PyBullet's motors never reach [m/s]
 
 
-def mjcf(boxes: list[Box], cone: str = "elliptic") -> str:
-    """The scene as MuJoCo's file."""
+def mjcf(boxes: list[Box], pads: list[Box]) -> str:
+    """The scene as MuJoCo's file, with elliptic cones."""
     bodies = "".join(
         f'<body pos="{words(box.place)}"><freejoint/>'
         f'<geom type="box" size="{words(box.half)}" mass="{box.mass}"/></body>'
@@ -84,12 +72,30 @@ def mjcf(boxes: list[Box], cone: str = "elliptic") -> str:
     )
     speeds = " ".join(f"{words(box.velocity)} 0 0 0" for box in boxes)
     places = " ".join(f"{words(box.place)} 1 0 0 0" for box in boxes)
+    zeros, forces = " 0" * len(pads), f" {PRESS}" * len(pads)
     return (
-        f'<mujoco><option timestep="{H}" cone="{cone}"/>'
+        f'<mujoco><option timestep="{H}" cone="elliptic"/>'
         f'<default><geom friction="{MU} 0 0"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody>'
-        f'<keyframe><key name="start" qpos="{places}" qvel="{speeds}"/></keyframe></mujoco>'
+        f'<geom type="plane" size="9 9 1"/>{bodies}{slides(pads)}</worldbody><actuator>'
+        + "".join(f'<motor joint="slide{i}"/>' for i in range(len(pads)))
+        + f'</actuator><keyframe><key name="start" qpos="{places}{zeros}" qvel="{speeds}{zeros}"'
+        f' ctrl="{forces}"/></keyframe></mujoco>'
     )
+
+
+def slides(pads: list[Box]) -> str:
+    """The pads as bodies of MuJoCo's file."""
+    return "".join(
+        f'<body pos="{words(pad.place)}"><joint name="slide{i}" type="slide"'
+        f' axis="{inwards(pad)} 0 0"/>'
+        f'<geom type="box" size="{words(pad.half)}" mass="{pad.mass}"/></body>'
+        for i, pad in enumerate(pads)
+    )
+
+
+def inwards(pad: Box) -> float:
+    """The direction along x in which a pad is pressed."""
+    return -math.copysign(1, pad.place[0])
 
 
 def words(numbers: Any) -> str:
@@ -98,12 +104,8 @@ def words(numbers: Any) -> str:
 
 
 def scene_text(scene: str) -> str:
-    """The scene as MuJoCo's file, with elliptic cones."""
-    if scene in PADS:
-        return GRIPPER.replace(
-            "<worldbody>", f'<default><geom friction="{MU} 0 0"/></default><worldbody>'
-        )
-    return mjcf(SCENES[scene])
+    """The scene as MuJoCo's file."""
+    return mjcf(SCENES[scene], PADS.get(scene, []))
 
 
 def mujocos(scene: str, steps: int) -> Iterator[Any]:
@@ -135,7 +137,7 @@ def geneses(scene: str, steps: int) -> Iterator[Any]:
     """Genesis' steps, in single precision, by its law for sliding contacts."""
     import genesis as gs
 
-    boxes = free_boxes(scene)
+    boxes, pads = SCENES[scene], PADS.get(scene, [])
     if not getattr(gs, "_initialized", False):
         gs.init(backend=gs.cpu, logging_level="error")
     world = gs.Scene(
@@ -154,18 +156,20 @@ def geneses(scene: str, steps: int) -> Iterator[Any]:
                 material=gs.materials.Rigid(rho=rho, friction=MU),
             )
         )
+    if pads:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "pads.xml"
+            file.write_text(f"<mujoco><worldbody>{slides(pads)}</worldbody></mujoco>")
+            gripper = world.add_entity(
+                gs.morphs.MJCF(file=str(file)), material=gs.materials.Rigid(friction=MU)
+            )
     world.build()
+    if pads:
+        gripper.control_dofs_force([PRESS] * len(pads))
     for body, box in zip(bodies, boxes, strict=True):
         body.set_dofs_velocity([*box.velocity, 0.0, 0.0, 0.0])
     for _ in range(steps):
         yield recorders.genesis(world)
-
-
-def free_boxes(scene: str) -> list[Box]:
-    """The boxes. ValueError if there are others, on slides."""
-    if scene in PADS:
-        raise ValueError(f"{scene}: has joints, which are not recorded of this engine")
-    return SCENES[scene]
 
 
 def drakes(scene: str, steps: int) -> Iterator[Any]:
@@ -210,7 +214,7 @@ def drakes(scene: str, steps: int) -> Iterator[Any]:
             f"slide{i}",
             plant.AddFrame(start),
             plant.GetBodyByName(f"box{i}").body_frame(),
-            [-math.copysign(1, pad.place[0]), 0, 0],
+            [inwards(pad), 0, 0],
         )
         plant.AddJointActuator(f"press{i}", plant.AddJoint(joint))
     plant.Finalize()
@@ -232,7 +236,7 @@ def bullets(scene: str, steps: int) -> Iterator[Any]:
     """PyBullet's steps."""
     import pybullet as bullet
 
-    boxes = free_boxes(scene)
+    boxes, pads = SCENES[scene], PADS.get(scene, [])
     client = bullet.connect(bullet.DIRECT)
     bullet.setGravity(0, 0, -9.81)
     bullet.setTimeStep(H)
@@ -241,10 +245,31 @@ def bullets(scene: str, steps: int) -> Iterator[Any]:
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=box.half)
         bodies.append(bullet.createMultiBody(box.mass, shape, basePosition=box.place))
         bullet.resetBaseVelocity(bodies[-1], box.velocity)
+    for pad in pads:
+        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=pad.half)
+        bodies.append(
+            bullet.createMultiBody(
+                basePosition=pad.place,
+                linkMasses=[pad.mass],
+                linkCollisionShapeIndices=[shape],
+                linkVisualShapeIndices=[-1],
+                linkPositions=[[0, 0, 0]],
+                linkOrientations=[[0, 0, 0, 1]],
+                linkInertialFramePositions=[[0, 0, 0]],
+                linkInertialFrameOrientations=[[0, 0, 0, 1]],
+                linkParentIndices=[0],
+                linkJointTypes=[bullet.JOINT_PRISMATIC],
+                linkJointAxis=[[inwards(pad), 0, 0]],
+            )
+        )
+        bullet.setJointMotorControl2(
+            bodies[-1], 0, bullet.VELOCITY_CONTROL, targetVelocity=FASTEST, force=PRESS
+        )
     for body in bodies:
-        # coefficients multiply
-        friction = MU**0.5
-        bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0, lateralFriction=friction)
+        bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+        # coefficients multiply; with a damping in the same call Bullet changes the base, not a link
+        for link in range(-1, bullet.getNumJoints(body)):
+            bullet.changeDynamics(body, link, lateralFriction=MU**0.5)
     for _ in range(steps):
         yield recorders.pybullet(client)
     bullet.disconnect()
@@ -271,7 +296,7 @@ def newtons(scene: str, steps: int) -> Iterator[Any]:
         x, y, z = pad.half
         material = kind(mu=MU, density=pad.mass / (8 * x * y * z))
         builder.add_shape_box(body, hx=x, hy=y, hz=z, cfg=material)
-        axis = warp.vec3(-math.copysign(1, pad.place[0]), 0, 0)
+        axis = warp.vec3(inwards(pad), 0, 0)
         joint = builder.add_joint_prismatic(-1, body, parent_xform=place, axis=axis)
         builder.add_articulation([joint])
     model = builder.finalize(device="cpu")
@@ -290,8 +315,10 @@ def newtons(scene: str, steps: int) -> Iterator[Any]:
 
 def siconoses(scene: str, steps: int) -> Iterator[Any]:
     """Siconos' steps."""
-    boxes = json.dumps([asdict(box) for box in free_boxes(scene)])
-    yield from recorders.siconos(SICONOS, arguments=[str(steps), str(H), SICONOS_SCALE, boxes])
+    boxes = [asdict(box) for box in SCENES[scene]]
+    boxes += [asdict(pad) | {"press": PRESS * inwards(pad)} for pad in PADS.get(scene, [])]
+    arguments = [str(steps), str(H), SICONOS_SCALE, json.dumps(boxes)]
+    yield from recorders.siconos(SICONOS, arguments=arguments)
 
 
 def ours(scene: str, steps: int) -> Iterator[Any]:

@@ -80,6 +80,8 @@ class Recorded:
         equations = "u = W r + q"
         if hasattr(problem, "M"):
             equations = "M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0"
+        elif problem.p:
+            equations = "u = W r + V lambda + q, V^T r + R lambda + s = 0"
         axes = AXES[problem.spacedim]
         info = _core.ProblemInfo(
             title=f"{self.engine}, t = {self.time:g} s",
@@ -103,6 +105,8 @@ class Recorded:
             if self.guess is None or self.velocity is None:
                 return None
             u = problem.W @ self.guess.r + problem.q
+            if problem.p:
+                u = u + problem.V @ self.guess.l
             return float(np.abs(u - np.asarray(self.velocity)).max(initial=0.0))
         untold = (problem.m and self.guess is None) or (
             problem.p and (self.guess is None or self.guess.l is None)

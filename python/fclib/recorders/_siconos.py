@@ -2,7 +2,8 @@
 
 The script runs in the interpreter that has Siconos (`fclib.external.siconos`), by
 _siconos_steps.py. With `MoreauJeanGOSI` the problem is global: M v = H r + q, u = H^T v + b. With
-other integrators it is local: u = W r + q. Joints and rolling friction are not recorded.
+other integrators it is local: u = W r + q. With joints it is u = W r + V lambda + q, and
+V^T r + R lambda + s = 0. Stops and friction of joints, and rolling friction, are not recorded.
 
 Acary & Perignon, "Siconos: a software platform for modeling, simulation, analysis and control of
 nonsmooth dynamical systems" (2007).
@@ -25,7 +26,7 @@ import scipy.sparse as sp
 from fclib import _core
 from fclib.external import siconos as installed
 from fclib.recorders._assemble import Assembled, Contacts
-from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, no_step
+from fclib.recorders._recorded import Maker, Origin, Recorded, Recording, SetupError, no_step
 
 STEPS = Path(__file__).with_name("_siconos_steps.py")
 
@@ -41,7 +42,7 @@ def siconos(
         ImportError: Siconos is not installed.
         FileNotFoundError: there is no such script.
         ChildProcessError: the script ended with an error; raised after the steps before it.
-        ValueError: `every` is below 1.
+        ValueError: `every` is below 1; a joint has a stop or friction.
     """
     made = (make() for make in steps(Path(script), arguments, every))
     return (step for step in made if step is not None)
@@ -78,9 +79,15 @@ def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Maker]
 
 
 def recorded(file: Path, version: str) -> Recorded:
-    """The data that _siconos_steps.py wrote for a step."""
+    """The data that _siconos_steps.py wrote for a step.
+
+    Raises:
+        SetupError: a joint has a stop or friction.
+    """
     with np.load(file) as data:
         known: dict[str, Any] = dict(data)
+    if "refused" in known:
+        raise SetupError(str(known["refused"]))
     dimension, h = int(known["dimension"]), float(known["h"])
     fields: dict[str, Origin]
     problem: _core.GlobalProblem | _core.LocalProblem
@@ -101,10 +108,14 @@ def recorded(file: Path, version: str) -> Recorded:
         )
         velocity = known["v"]
     else:
+        names = [name for name in ("W", "V", "R") if f"{name}_data" in known]
+        vectors = [name for name in ("q", "s", "mu") if name in known]
         problem = _core.LocalProblem(
-            spacedim=dimension, W=columns(known, "W"), q=known["q"], mu=known["mu"]
+            spacedim=dimension,
+            **{name: columns(known, name) for name in names},
+            **{name: known[name] for name in vectors},
         )
-        fields = dict.fromkeys(("W", "q", "mu"), "exact")
+        fields = dict.fromkeys((*names, *vectors), "exact")
         velocity = known["u"]
     return Recorded(
         assembled=Assembled(problem, len(velocity)),
@@ -115,7 +126,7 @@ def recorded(file: Path, version: str) -> Recorded:
         time=float(known["end"]) - h,
         h=h,
         fields=fields,
-        guess=_core.Solution(r=known["r"]),
+        guess=_core.Solution(r=known["r"], l=known.get("l")),
         velocity=velocity,
         contacts=contacts,
         notes=("The velocity and the reaction are those that Siconos' solver returned.",),

@@ -5,7 +5,7 @@
 Knows nothing of fclib. FOLDER/STEP.npz has the problem of a kept step with contacts,
 FOLDER/steps.json the number of steps and the version. The friction classes that a script finds in
 `siconos.kernel` are replaced by ones that write; so are the classes by which `mechanics_run`
-traces.
+traces. A step that is not recorded has a file with the reason.
 """
 
 import json
@@ -118,8 +118,47 @@ def places(osns: Any) -> Any:
     }
 
 
-def writing(original: Any, told: Any, steps: Steps) -> Any:
-    """A class of friction problems that writes the problems that it solves."""
+def mixed(osns: Any) -> Any:
+    """W, V, R, q, s, mu and the solution after a solve: siconos.kernel.GenericMechanical.
+
+    Its rows are those of joints and contacts, in the order of the interactions.
+    """
+    topology = osns.simulation().nonSmoothDynamicalSystem().topology()
+    contact, joint, mu, dimension, start = [], [], [], 0, 0
+    for one in topology.indexSet(osns.indexSetLevel()).interactions():
+        law = one.nonSmoothLaw()
+        rows = range(start, start + law.size())
+        start = rows.stop
+        friction = kernel.cast_NewtonImpactFrictionNSL(law)
+        if friction is not None:
+            contact.extend(rows)
+            mu.append(friction.mu())
+            dimension = len(rows)
+        elif kernel.cast_NewtonImpactNSL(law) is None and kernel.cast_RelayNSL(law) is None:
+            joint.extend(rows)
+        else:
+            kind = "a stop" if kernel.cast_RelayNSL(law) is None else "friction"
+            return {"refused": f"a joint has {kind}, which is not recorded"}
+    if not contact:
+        return {}
+    whole = scipy.sparse.csc_matrix(numerics.NM_csc(osns.M().numericsMatrix()))
+    q, z, w = (np.array(part())[:start] for part in (osns.q, osns.z, osns.w))
+    arrays = {
+        **columns("W", whole[contact][:, contact]),
+        "q": q[contact],
+        "mu": np.array(mu),
+        "dimension": dimension,
+        "r": z[contact],
+        "u": w[contact],
+    }
+    if joint:
+        arrays |= columns("V", whole[contact][:, joint]) | columns("R", whole[joint][:, joint])
+        arrays |= {"s": q[joint], "l": z[joint]}
+    return arrays
+
+
+def shown(original: Any, solved: Any) -> Any:
+    """A class of nonsmooth problems whose `compute` is `solved`."""
 
     class Shown(original):  # type: ignore[misc]
         def __new__(cls, *arguments: Any, **options: Any) -> Any:
@@ -130,36 +169,63 @@ def writing(original: Any, told: Any, steps: Steps) -> Any:
             super().__init__(*arguments[:2])  # further arguments are for a trace
 
         def compute(self, now: float) -> int:
-            kept = steps.next(now)
-            if not self.preCompute(now) or self.indexSetLevel() == NO_INDEX_SET:
-                return 0
-            self.updateMu()
-            if not self.getSizeOutput():
-                # the global problem also moves bodies that touch nothing
-                return int(original.compute(self, now))
-            arrays: Any = {}
-            if kept:
-                arrays, problem = told(self)
-                nc, dimension = problem.numberOfContacts, problem.dimension
-                simulation = self.simulation()
-                arrays |= {"mu": np.array(problem.mu)[:nc], "dimension": dimension}
-                arrays |= {"end": now, "h": simulation.timeStep(), **places(self)}
-            start = time.process_time()
-            info: int = self.solve()
-            cpu = time.process_time() - start
-            if arrays:
-                m = dimension * nc
-                arrays |= {"r": np.array(self.z())[:m], "u": np.array(self.w())[:m]}
-                if hasattr(self, "globalVelocities"):
-                    arrays["v"] = np.array(self.globalVelocities())[: len(arrays["q"])]
-                steps.write(arrays | {"solve_cpu_s": cpu})
-            self.postCompute()
-            return info
+            return int(solved(self, now))
 
     class Hidden(Shown):
         pass
 
     return Shown
+
+
+def writing(original: Any, told: Any, steps: Steps) -> Any:
+    """A class of friction problems that writes the problems that it solves."""
+
+    def solved(self: Any, now: float) -> int:
+        kept = steps.next(now)
+        if not self.preCompute(now) or self.indexSetLevel() == NO_INDEX_SET:
+            return 0
+        self.updateMu()
+        if not self.getSizeOutput():
+            # the global problem also moves bodies that touch nothing
+            return int(original.compute(self, now))
+        arrays: Any = {}
+        if kept:
+            arrays, problem = told(self)
+            nc, dimension = problem.numberOfContacts, problem.dimension
+            simulation = self.simulation()
+            arrays |= {"mu": np.array(problem.mu)[:nc], "dimension": dimension}
+            arrays |= {"end": now, "h": simulation.timeStep(), **places(self)}
+        start = time.process_time()
+        info: int = self.solve()
+        cpu = time.process_time() - start
+        if arrays:
+            m = dimension * nc
+            arrays |= {"r": np.array(self.z())[:m], "u": np.array(self.w())[:m]}
+            if hasattr(self, "globalVelocities"):
+                arrays["v"] = np.array(self.globalVelocities())[: len(arrays["q"])]
+            steps.write(arrays | {"solve_cpu_s": cpu})
+        self.postCompute()
+        return info
+
+    return shown(original, solved)
+
+
+def writing_mixed(original: Any, steps: Steps) -> Any:
+    """The same of the problems that have joints, whose solve cannot be called alone."""
+
+    def solved(self: Any, now: float) -> int:
+        kept = steps.next(now)
+        start = time.process_time()
+        info: int = original.compute(self, now)
+        cpu = time.process_time() - start
+        there = self.indexSetLevel() != NO_INDEX_SET and self.getSizeOutput()
+        arrays = mixed(self) if kept and there else {}
+        if arrays:
+            told = {"end": now, "h": self.simulation().timeStep(), "solve_cpu_s": cpu}
+            steps.write(arrays | told)
+        return info
+
+    return shown(original, solved)
 
 
 def main() -> None:
@@ -177,6 +243,7 @@ def main() -> None:
         setattr(kernel, name, writes)
         if runner is not None:
             setattr(runner, trace, writes)
+    kernel.GenericMechanical = writing_mixed(kernel.GenericMechanical, steps)
     sys.argv = [script, *arguments]
     sys.path.insert(0, str(Path(script).parent))
     try:

@@ -1,8 +1,9 @@
-"""Why our sets have more contacts, or fewer degrees of freedom, than the published ones.
+"""Why figures of our sets are others than the published ones: contacts, bodies, conditioning.
 
     .venv/bin/python -m workshop.sets.differences closed DIR SET/FAMILY... [--results NAME]
     .venv/bin/python -m workshop.sets.differences untouched DIR SET/FAMILY... --files FILES
         [--results NAME]
+    .venv/bin/python -m workshop.sets.differences lighter DIR SET/FAMILY... [--results NAME]
 
 DIR has the built families. `closed` counts in problems of each, evenly spread, all contacts, those
 that are closed (their gap is at most zero), those that are open by at most a third of the largest
@@ -11,6 +12,9 @@ gap, and those that carry a reaction. Minutes of CPU.
 `untouched` takes the list of the published files, whose names have contacts and degrees of freedom:
 a problem with fewer ends of contacts than bodies has bodies that nothing touches. It prints the
 bodies of a problem with a given number of contacts, in the published set and in ours.
+
+`lighter` finds the conditioning of W of elastic bodies, of the first stored state, as it is and
+with an eighth of the mass.
 """
 
 from __future__ import annotations
@@ -22,8 +26,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import scipy.sparse as sp
 
 import fclib
+from fclib.collections import published as stored
+from fclib.collections import set_index as versions
+from fclib.collections import trajectory
 from workshop.sets import collection_table
 from workshop.tables import _results
 from workshop.tables.published_beside_ours import sets
@@ -34,6 +42,23 @@ SECONDS: Final = 10.0
 FLAT: Final = 1e-6  # [1] normals that differ by less are those of one face
 CARRIES: Final = 1e-6  # a normal reaction above this share of the largest one
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the published problems, by their contacts
+
+
+# title and note of each table
+TOLD: Final = {
+    "closed": (
+        "Contacts of the decks: all, closed, and those that carry",
+        f"Up to {SAMPLE} problems of each; auto to {TOLERANCE:g}, at most {SECONDS:g} s.",
+    ),
+    "untouched": (
+        "Bodies of the published chutes and of ours, at the same contacts",
+        "Quarters of the published problems by their contacts.",
+    ),
+    "lighter": (
+        "Conditioning of W of elastic cubes, with the mass and with an eighth of it",
+        "All contacts of the first stored state.",
+    ),
+}
 
 
 def published_of(name: str) -> list[dict[str, str]]:
@@ -112,10 +137,37 @@ def untouched(folder: Path, name: str, files: Path) -> Iterator[dict[str, str]]:
         }
 
 
+def lighter(name: str) -> Iterator[dict[str, str]]:
+    """The row of an elastic family: W = H^T (s M + (h theta)^2 K)^-1 H for two shares s."""
+    path = stored.path_of(name, versions.version_of(name))
+    if path is None:
+        raise SystemExit(f"{name}: no states are stored")
+    states = trajectory.read(path)
+    model: Any = states.model
+    if not hasattr(model, "K"):
+        raise SystemExit(f"{name}: has no stiffness; only elastic families have")
+    part: Any = states.problem(0)
+    free = part.dofs[: part.problem.n]
+    conditioning = []
+    for share in (1.0, 1 / 8):
+        M = share * model.M + (states.time_step * states.scene.theta) ** 2 * model.K
+        W: Any = part.problem.replace(M=sp.csc_array(M[free][:, free])).condense().W
+        values = np.linalg.svd(W.toarray(), compute_uv=False)
+        conditioning.append(collection_table.span([values[0] / values[-1]]))
+    theirs = ", ".join(row["conditioning"] for row in published_of(name) if row["conditioning"])
+    as_it_is, light = conditioning
+    yield {
+        "set": name,
+        "published conditioning": theirs,
+        "ours": as_it_is,
+        "with an eighth of the mass": light,
+    }
+
+
 def main() -> None:
     """Print one of the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("table", choices=("closed", "untouched"))
+    parser.add_argument("table", choices=("closed", "untouched", "lighter"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("families", nargs="+", metavar="SET/FAMILY")
     parser.add_argument("--files", type=Path, help="list of the published files")
@@ -126,26 +178,16 @@ def main() -> None:
     made: dict[str, Callable[[str], Iterator[dict[str, str]]]] = {
         "closed": lambda name: closed(own.folder, name),
         "untouched": lambda name: untouched(own.folder, name, own.files),
+        "lighter": lighter,
     }
     table = []
     for name in own.families:
         for row in made[own.table](name):
             table.append(row)
             print(row, flush=True)
-    if own.results and own.table == "closed":
-        _results.store(
-            own.results,
-            table,
-            title="Contacts of the decks: all, closed, and those that carry",
-            note=f"Up to {SAMPLE} problems of each; auto to {TOLERANCE:g}, at most {SECONDS:g} s.",
-        )
-    elif own.results:
-        _results.store(
-            own.results,
-            table,
-            title="Bodies of the published chutes and of ours, at the same contacts",
-            note="Quarters of the published problems by their contacts.",
-        )
+    if own.results:
+        title, note = TOLD[own.table]
+        _results.store(own.results, table, title=title, note=note)
 
 
 if __name__ == "__main__":

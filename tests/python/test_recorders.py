@@ -565,7 +565,7 @@ def tree_of_bullet(bullet: Any, client: int, mass: float) -> int:
     options = {"physicsClientId": client}
     random = np.random.default_rng(0)
 
-    def vectors(size: float, width: int = 3) -> list[list[float]]:
+    def vectors(size: float, width: int = 3) -> Any:
         found = random.normal(size=(4, width))
         if width == 4:
             found /= np.linalg.norm(found, axis=1)[:, None]

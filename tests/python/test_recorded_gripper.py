@@ -87,7 +87,7 @@ def test_pads_hold_a_box_by_friction(engine: str) -> None:
     median = {name: np.median([one[name] for one in found]) for name in recorders.CRITERIA}
     assert median["cone"] < 1e-6
     assert median["tension"] == 0
-    assert median["distance"] < 0.01
+    assert median["distance"] < 0.05
     assert median["penetration"] < 0.02
     assert median["dissipation"] < 0.03
     assert median["energy"] < 1e-3

@@ -79,15 +79,15 @@ def test_pads_hold_a_box_by_friction(engine: str) -> None:
         assert np.median(carried) == pytest.approx((box + 2) * GRAVITY, rel=2e-3)
     else:
         found = np.median([pushes(step) for step in steps], axis=0)
-        np.testing.assert_allclose(found[:, 0], [press, -press], rtol=2e-3)
-        assert found[:, 2].sum() == pytest.approx(box * GRAVITY, rel=2e-3)
+        np.testing.assert_allclose(found[:, 0], [press, -press], rtol=5e-3)
+        assert found[:, 2].sum() == pytest.approx(box * GRAVITY, rel=5e-3)
     # soft contacts creep; without friction it would have the speed of all steps
     assert slip(last) < GRAVITY * H
     found = [recorders.criteria_of(step.problem, step.guess) for step in steps]
     median = {name: np.median([one[name] for one in found]) for name in recorders.CRITERIA}
     assert median["cone"] < 1e-6
     assert median["tension"] == 0
-    assert median["distance"] < 0.01
+    assert median["distance"] < 0.05
     assert median["penetration"] < 0.02
     assert median["dissipation"] < 0.03
     assert median["energy"] < 1e-3

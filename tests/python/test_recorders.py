@@ -565,7 +565,7 @@ def tree_of_bullet(bullet: Any, client: int, mass: float) -> int:
     options = {"physicsClientId": client}
     random = np.random.default_rng(0)
 
-    def vectors(size: float, width: int = 3) -> list[list[float]]:
+    def vectors(size: float, width: int = 3) -> Any:
         found = random.normal(size=(4, width))
         if width == 4:
             found /= np.linalg.norm(found, axis=1)[:, None]
@@ -1196,8 +1196,9 @@ def test_siconos_joints_are_bilateral_rows(tmp_path: Path) -> None:
         np.testing.assert_allclose(held, 0, atol=1e-9)
         errors.append(fclib.merit(problem, recorded.guess).error)
         assert fclib.solve(problem, tol=1e-10).converged
-    # where it converges
-    assert np.median(errors) < 1e-6
+    # this solver of Siconos stops by a measure of its own
+    assert min(errors) < 1e-9
+    assert max(errors) < 1e-3
     # the ball comes at 3 m/s and does not roll, until it runs into the next one
     first = np.reshape(steps[0].velocity, (-1, 3))
     assert np.linalg.norm(first[:, 1:], axis=1).max() == pytest.approx(3, rel=0.02)

@@ -96,7 +96,7 @@ def record(
             raise ValueError(f"constraint {i}: bodies without constraints are recorded")
     place, n = places_of(p, bodies, options)
     v0 = velocities(p, place, n, options)
-    parts = {}
+    parts: dict[tuple[int, int], Part] = {}
     for body in bodies:
         parts |= parts_of(p, body, place, v0, options)
     M, force = np.zeros((n, n)), np.zeros(n)

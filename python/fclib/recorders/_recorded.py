@@ -105,7 +105,9 @@ class Recorded:
             if self.guess is None or self.velocity is None:
                 return None
             u = problem.W @ self.guess.r + problem.q
-            if problem.p:
+            if problem.V is not None:
+                if self.guess.l is None:
+                    return None
                 u = u + problem.V @ self.guess.l
             return float(np.abs(u - np.asarray(self.velocity)).max(initial=0.0))
         untold = (problem.m and self.guess is None) or (

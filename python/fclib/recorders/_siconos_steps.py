@@ -124,7 +124,9 @@ def mixed(osns: Any) -> Any:
     Its rows are those of joints and contacts, in the order of the interactions.
     """
     topology = osns.simulation().nonSmoothDynamicalSystem().topology()
-    contact, joint, mu, dimension, start = [], [], [], 0, 0
+    contact: list[int] = []
+    joint: list[int] = []
+    mu, dimension, start = [], 0, 0
     for one in topology.indexSet(osns.indexSetLevel()).interactions():
         law = one.nonSmoothLaw()
         rows = range(start, start + law.size())

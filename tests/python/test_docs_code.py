@@ -28,7 +28,7 @@ from doc_blocks import WORDS, Block, blocks_of, pages
 from fclib import bench
 from fclib.cli import app
 from helpers import planted_local
-from helpers_report import make_collection, make_store
+from helpers_report import make_store
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -80,7 +80,7 @@ SCENE = """
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory, root: Path, collection: Path) -> Path:
     """A folder with the files of which the pages speak."""
     from fclib.demo import simulate
 
@@ -102,9 +102,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     for name in ("robot.xml", "scene.xml"):
         (folder / name).write_text(SCENE)
     shutil.copy(root / "examples/python/own_solver.py", folder / "my_solver.py")
-    collection = make_collection(folder / "collection")
+    shutil.copytree(collection, folder / "collection")
     # of one tolerance: each has pictures of its own
-    quick = make_store(folder / "quick.sqlite", collection, files=4, tolerances=(1e-8,))
+    quick = make_store(folder / "quick.sqlite", folder / "collection", files=4, tolerances=(1e-8,))
     with bench.Store(quick) as store:
         store.db.execute("UPDATE machines SET node = 'node7'")
         store.seal()

@@ -1199,9 +1199,6 @@ def test_siconos_joints_are_bilateral_rows(tmp_path: Path) -> None:
     # this solver of Siconos stops by a measure of its own
     assert min(errors) < 1e-9
     assert max(errors) < 1e-3
-    # the ball comes at 3 m/s and does not roll, until it runs into the next one
-    first = np.reshape(steps[0].velocity, (-1, 3))
-    assert np.linalg.norm(first[:, 1:], axis=1).max() == pytest.approx(3, rel=0.02)
 
 
 def test_stops_of_siconos_joints_are_refused(tmp_path: Path) -> None:

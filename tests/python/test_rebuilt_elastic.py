@@ -1,4 +1,4 @@
-"""M, H, f and w of elastic cubes follow from their states and meshes, by NumPy alone."""
+"""M, H, f and w of elastic cubes and of a wall follow from states and meshes, by NumPy alone."""
 
 from __future__ import annotations
 

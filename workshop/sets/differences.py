@@ -7,7 +7,8 @@
 
 DIR has the built families. `closed` counts in problems of each, evenly spread, all contacts, those
 that are closed (their gap is at most zero), those that are open by at most a third of the largest
-gap, and those that carry a reaction. Minutes of CPU.
+gap, and those that carry a reaction (none are counted if no solution was found). If all contacts
+are on one face, it counts those inside the rectangle around them too. Minutes of CPU.
 
 `untouched` takes the list of the published files, whose names have contacts and degrees of freedom:
 a problem with fewer ends of contacts than bodies has bodies that nothing touches. It prints the
@@ -42,7 +43,6 @@ SECONDS: Final = 60.0
 FLAT: Final = 1e-6  # [1] normals that differ by less are those of one face
 CARRIES: Final = 1e-6  # a normal reaction above this share of the largest one
 SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the published problems, by their contacts
-
 
 # title and note of each table
 TOLD: Final = {
@@ -91,7 +91,7 @@ def inside(contacts: Any) -> int | None:
 
 
 def counted(problem: Any) -> dict[str, int | None]:
-    """The contacts of a problem: all, and kinds of them."""
+    """The contacts of a problem: all, and kinds of them; None if a kind is not known."""
     gap = np.asarray(problem.contacts.gap)
     found = fclib.solve(problem, tol=TOLERANCE, time_limit=SECONDS)
     normal = np.reshape(found.solution.r, (problem.nc, -1))[:, 0]

@@ -11,8 +11,8 @@ tenth, as collection_table.py compares them; the steps are then spread by each f
 regime that is as long as published is filled up to the published number by further steps, evenly
 spread in time. A simulation made again is another one in its last digits, and in the end in all of
 them. So a regime that grows keeps the states that are stored, and takes further steps beside them.
-One in time has all its steps evenly spread in time, and of the stored states those whose problems a
-chosen set has.
+A regime that is in time has steps evenly spread in time. A state whose problem a chosen set has
+stays, in the place of a step near to it.
 
 States in which a body is deeper in another than its regime allows are left out.
 

@@ -165,11 +165,12 @@ def directions_and_gaps(
         away = np.abs(x[slave] - x[faces].mean(axis=1)).max(axis=1)
         for nodes in faces[away <= np.ptp(x[faces], axis=1).max(axis=1) + near]:
             weights, gap, outside = foot(x[slave], x[nodes])
-            outside = max(outside, 1.0)
-            if abs(gap) < near and (best is None or outside < best[0]):
-                best = (outside, nodes, weights, gap)
+            # a node may be below two faces: either is right, and the gap says which was taken
+            order = max(outside, 1.0), abs(gap - contacts.gap[c])
+            if abs(gap) < near and (best is None or order < best[0]):
+                best = (order, nodes, weights, gap)
         assert best is not None
-        outside, nodes, weights, gap = best
+        (outside, _), nodes, weights, gap = best
         assert outside < 1 + 1e-3
         for node, share in ((slave, 1.0), *zip(nodes, -weights, strict=True)):
             H[3 * node : 3 * node + 3, 3 * c : 3 * c + 3] += share * contacts.frame[c].T

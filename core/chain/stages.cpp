@@ -7,11 +7,14 @@
 #include <random>
 #include <utility>
 
+#include "chain/chain.hpp"
+#include "linalg/cpu_time.hpp"
 #include "linalg/memory.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/pivoting.hpp"
 #include "methods/product_interior_point.hpp"
 #include "methods/spectral_gradient.hpp"
+#include "reduced/in_own_units.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
@@ -45,6 +48,10 @@ constexpr std::int64_t first_cone_look = 5;       // iterations before the first
 constexpr std::int64_t steps_per_cone_look = 15;  // ... and between two looks
 constexpr double most_outside = 1e-2;             // share of ||r|| that may be outside the cones
 constexpr double exact_residual = 0.01;           // [tolerance] What is left is not in the cones.
+
+// In own units the chain goes on to this part of the tolerance, if no iterate is good enough
+// before.
+constexpr double own_tolerance = 1e-2;
 
 // polishing on the way
 constexpr double polish_below = 1e-5;          // a polish is tried below this error
@@ -646,6 +653,35 @@ void Island<Cone>::run(const AssociatedStage& /*rules*/) {
                    return done();
                  });
   }
+}
+
+template <class Cone>
+void Island<Cone>::run(const OwnUnitsStage& rules) {
+  if (!(range_of_units(problem_) > rules.range)) return;
+  const InOwnUnits own(problem_);
+  Table before;
+  for (const StageRule& rule : table_) {
+    if (std::holds_alternative<OwnUnitsStage>(rule.method)) break;
+    before.push_back(rule);
+  }
+  if (before.empty()) return;
+  // it ends as soon as an iterate is good enough in the units of the problem
+  Settings settings;
+  settings.tolerance = own_tolerance * tolerance_;
+  settings.max_iterations = tracker_.left();
+  Vector u(problem_.m());
+  std::int64_t told = 0;
+  settings.callback = [&](const Progress& progress) {
+    const Vector r = own.reactions(*progress.r);
+    problem_.velocity(r, u);
+    const std::int64_t count = progress.iteration - std::exchange(told, progress.iteration);
+    return !take(count, relative_error<Cone>(problem_, u, r), r);
+  };
+  Vector r = own.to_own(start_of(rules.from));
+  const double start = cpu_time();
+  const Outcome outcome = chain::run(own.problem(), before, resources_, settings, r);
+  for (const Stage& stage : outcome.stages) own_factorisations_ += stage.factorisations;
+  if (outcome.cpu_s) tracker_.add_cpu(*outcome.cpu_s - (cpu_time() - start));
 }
 
 #define FCLIB_INSTANTIATE(Cone) template class Island<Cone>;

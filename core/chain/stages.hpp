@@ -83,6 +83,7 @@ class Island {
   void run(const RandomStartsStage& rules);
   void run(const NoSolutionStage& rules);
   void run(const AssociatedStage& rules);
+  void run(const OwnUnitsStage& rules);
 
   const ReducedProblem& problem_;
   const Table& table_;

@@ -358,10 +358,31 @@ struct RandomStartsStage {
   }
 };
 
-using Method =
-    std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage, ConjugateGradientsStage,
-                 NewtonStage, PolishStage, ProximalStage, InteriorPointStage, AssociatedStage,
-                 NoSolutionStage, HeldBodiesStage, HomotopyStage, PivotingStage, RandomStartsStage>;
+/// If some bodies are very much lighter than others, or lengths stand beside angles, sweeps and
+/// factors of W lose digits on what is small. In its own units (reduced/own_units.hpp) all diagonal
+/// blocks of W are about 1.
+struct OwnUnitsStage {
+  static constexpr std::string_view name = "own_units";
+  static constexpr std::string_view families = "chain";
+  static constexpr std::string_view doc =
+      "The stages of the table before this one, on the problem in the units of its contacts.";
+  double range = 1e6;
+  Start from = Start::nothing;
+
+  static constexpr auto fields() {
+    using O = OwnUnitsStage;
+    return std::tuple{
+        option("range", &O::range, "1", {1},
+               "The stage runs only if the largest trace of a diagonal block of W is more than so "
+               "many times the least one."),
+        start_from(&O::from)};
+  }
+};
+
+using Method = std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage,
+                            ConjugateGradientsStage, NewtonStage, PolishStage, ProximalStage,
+                            InteriorPointStage, AssociatedStage, NoSolutionStage, HeldBodiesStage,
+                            HomotopyStage, PivotingStage, RandomStartsStage, OwnUnitsStage>;
 
 struct StageRule {
   std::string name;

@@ -143,6 +143,26 @@ std::vector<Index> BlockMatrix::components() const {
   return groups.numbers();
 }
 
+BlockMatrix BlockMatrix::scaled(const Vector& factors) const {
+  BlockMatrix result = *this;
+  if (dense_) {
+    const Eigen::Index m = Eigen::Index{d_} * nc_;
+    Eigen::Map<Eigen::MatrixXd> all(result.values_.data(), m, m);
+    all = factors.asDiagonal() * all * factors.asDiagonal();
+    return result;
+  }
+  double* values = result.values_.data();
+  for (Index col = 0; col < nc_; ++col) {
+    const auto by = factors.segment(Eigen::Index{d_} * col, d_);
+    for (std::size_t k = column_[col]; k < column_[col + 1]; ++k, values += d_ * d_) {
+      Eigen::Map<Eigen::MatrixXd> block(values, d_, d_);
+      block =
+          factors.segment(Eigen::Index{d_} * row_[k], d_).asDiagonal() * block * by.asDiagonal();
+    }
+  }
+  return result;
+}
+
 BlockMatrix BlockMatrix::restricted(const std::vector<Index>& contacts) const {
   BlockMatrix result;
   result.d_ = d_;

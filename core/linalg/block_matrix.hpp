@@ -53,6 +53,9 @@ class BlockMatrix {
   /// numbered by their first contact.
   [[nodiscard]] std::vector<Index> components() const;
 
+  /// F A F, if F is diagonal with these entries (d nc).
+  [[nodiscard]] BlockMatrix scaled(const Vector& factors) const;
+
   /// The rows and columns of these contacts, which must be a union of whole groups.
   [[nodiscard]] BlockMatrix restricted(const std::vector<Index>& contacts) const;
 

@@ -7,14 +7,6 @@
 
 namespace fclib {
 
-namespace {
-
-/// Share of the largest mean. If joints hold a contact, what they leave of it is rounding below
-/// this.
-constexpr double nothing = 1e-14;
-
-}  // namespace
-
 OwnUnits::OwnUnits(const ReducedProblem& problem)
     : problem_(problem), unit_(problem.m()), friction_(problem.friction) {
   const int d = problem.d();
@@ -39,13 +31,13 @@ OwnUnits::OwnUnits(const ReducedProblem& problem)
   double sum[2] = {0, 0};
   double count[2] = {0, 0};
   each_part([&](int part, auto values) {
-    if (!(values[0] > nothing * largest[part])) return;
+    if (!(values[0] > nothing_moves * largest[part])) return;
     sum[part] += values[0];
     ++count[part];
   });
   each_part([&](int part, auto values) {
     const double usual = count[part] > 0 ? sum[part] / count[part] : 1.0;
-    values.setConstant(std::sqrt(values[0] > nothing * largest[part] ? values[0] : usual));
+    values.setConstant(std::sqrt(values[0] > nothing_moves * largest[part] ? values[0] : usual));
   });
   inverse_ = unit_.cwiseInverse();
   q_ = problem.q.cwiseProduct(inverse_);

@@ -13,6 +13,10 @@
 
 namespace fclib {
 
+/// Share of the largest W_aa. If joints hold a contact, what they leave of it is rounding below
+/// this.
+inline constexpr double nothing_moves = 1e-14;
+
 class OwnUnits {
  public:
   explicit OwnUnits(const ReducedProblem& problem);
@@ -22,8 +26,15 @@ class OwnUnits {
   /// q~ (m).
   [[nodiscard]] const Vector& q() const { return q_; }
 
-  /// r~ of r (m).
+  /// S (m) and S^-1.
+  [[nodiscard]] const Vector& unit() const { return unit_; }
+  [[nodiscard]] const Vector& inverse() const { return inverse_; }
+
+  /// r~ of r (m), and u~ of u.
   [[nodiscard]] Vector to_own(const Vector& r) const { return r.cwiseProduct(unit_) / size_; }
+  [[nodiscard]] Vector to_own_velocities(const Vector& u) const {
+    return u.cwiseProduct(inverse_) / size_;
+  }
   /// r of r~, and u of u~ (m).
   [[nodiscard]] Vector reactions(const Vector& r) const { return size_ * r.cwiseProduct(inverse_); }
   [[nodiscard]] Vector velocities(const Vector& u) const { return size_ * u.cwiseProduct(unit_); }

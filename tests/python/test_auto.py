@@ -526,6 +526,53 @@ def test_a_chain_of_ones_own() -> None:
     assert stage_names(result) == ["b"]
 
 
+@pytest.mark.parametrize("law", ["plane", "space", "joints", "rolling"])
+def test_a_problem_in_its_own_units_is_the_same_problem(law: str) -> None:
+    """Sweeps do not depend on the units of contacts: two halves are as good as the whole."""
+    plain: Any = {
+        "plane": lambda: bodies(4, 20, d=2, hyperstatic=True).condense(),
+        "space": lambda: bodies(6, 12, mu=0.5).condense(),
+        "joints": lambda: planted_local(5, nc=12, p=5).problem,
+        "rolling": lambda: planted_rolling(5, 17, 10)[0],
+    }[law]()
+    d, units = plain.spacedim, 10.0 ** np.random.default_rng(3).uniform(-3, 3, plain.nc)
+    rows = sp.diags(np.repeat(units, d))
+    problem = plain.replace(W=rows @ sp.csc_matrix(dense(plain.W)) @ rows, q=rows @ plain.q)
+    if plain.p:
+        problem = problem.replace(V=rows @ dense(plain.V))
+    whole = fclib.solve(problem, chain="sweeps : gauss_seidel limit=5000 worth=0")
+    assert whole.converged
+    assert whole.iterations > 10
+    sweeps = f"sweeps : gauss_seidel on=whole limit={2 * whole.iterations // 3} worth=0"
+    assert fclib.solve(problem, chain=sweeps).status == "stalled"
+    chain = f"{sweeps}; own : own_units from=best range="
+    result = fclib.solve(problem, chain=chain + "1e3", history=True)
+    assert result.converged
+    assert_honest(problem, result, 1e-8)
+    assert [stage.solved for stage in result.stages] == [0, 1]
+    assert result.iterations <= 1.1 * whole.iterations + 10
+    assert result.history is not None
+    assert result.history[-1][1] == pytest.approx(result.error, rel=1e-3, abs=1e-12)
+    assert fclib.solve(problem, chain=chain + "1e30").status == "stalled"
+    # nothing comes before it, so it does nothing
+    assert fclib.solve(problem, chain="own : own_units range=1").status == "stalled"
+
+
+def test_limits_hold_in_own_units() -> None:
+    problem = bodies(4, 20, mu=0.5, hyperstatic=True)
+    chain = "sweeps : gauss_seidel limit=4 worth=0; own : own_units range=1.01"
+    assert fclib.solve(problem, chain=chain).iterations == 8
+    result = fclib.solve(problem, chain=chain, max_iterations=6)
+    assert (result.status, result.iterations) == ("iteration_limit", 6)
+    count = [0]
+
+    def stop(*_: Any) -> bool:
+        count[0] += 1
+        return count[0] < 4
+
+    assert fclib.solve(problem, chain=chain, callback=stop).status == "interrupted"
+
+
 @pytest.mark.parametrize("method", ["sweep_on", "spectral_gradient"])
 def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
     packing: Any = fclib.scenes.assemblies()["Packing"]()

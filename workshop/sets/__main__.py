@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -60,13 +61,14 @@ def find_candidates(
         with many_bars() as bars:
             _, failed = difficulty.describe(folder, own, bars)
         rows = difficulty.measured(folder)
-        count = difficulty.write_problems(folder, rows, select.Rule())
+        count, lost = difficulty.write_problems(folder, rows, select.Rule())
     except difficulty.FAULTS as error:
         fail(str(error))
     words = f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}"
     out.print(words, highlight=False)
     for name, reason in failed.items():
         err.print(f"{name}: has no candidates: {reason}", style="red", highlight=False)
+    tell_lost(lost)
     if results:
         costs = difficulty.known_costs(folder)
         table = [{"family": name, "CPU [s]": f"{costs[name]:.1f}"} for name in sorted(own)]
@@ -76,7 +78,13 @@ def find_candidates(
             title="What the candidates of the sets cost",
             note="Simulation of families without stored states, and features.",
         )
-    raise typer.Exit(int(bool(failed)))
+    raise typer.Exit(int(bool(failed or lost)))
+
+
+def tell_lost(lost: Mapping[str, str]) -> None:
+    """Say which candidates have no file, and why."""
+    for name, reason in lost.items():
+        err.print(f"{name}: cannot be written: {reason}", style="red", highlight=False)
 
 
 @app.command()
@@ -101,7 +109,9 @@ def measure(
         return
     try:
         difficulty.run(folder, select.SHORT, jobs)
-        count = difficulty.write_problems(folder, difficulty.measured(folder), rule)
+        _, lost = difficulty.write_problems(folder, difficulty.measured(folder), rule)
+        tell_lost(lost)
+        count = len(list((folder / "problems").glob("*/*.hdf5")))
         if count > files:
             out.print(difficulty.needed(folder, select.SHORT, count), highlight=False)
             difficulty.run(folder, select.SHORT, jobs)

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from fclib import _core
+from fclib import _core, _digest
 from fclib.bench import Campaign, Store
 from fclib.collections import ratings
 from workshop.sets import candidates, select
@@ -119,26 +119,46 @@ def write_costs(path: Path, costs: Mapping[str, float]) -> None:
     path.write_text("family,CPU [s]\n" + "".join(lines), encoding="utf-8")
 
 
-def write_problems(folder: Path, rows: Sequence[select.Row], rule: select.Rule) -> int:
-    """Write a file for each candidate that is measured; remove others. Return their number."""
-    wanted = {
+def write_problems(
+    folder: Path, rows: Sequence[select.Row], rule: select.Rule
+) -> tuple[int, dict[str, str]]:
+    """Write a file for each candidate that is to be run; remove those that are not measured.
+
+    A candidate whose runs the stores have needs none, so published runs need not be made again.
+
+    Returns:
+        The number of measured candidates, and why a family or a problem cannot be written.
+    """
+    measures = {
         path_of(folder, row): row
         for row, words in zip(rows, select.not_measured(rows, rule), strict=True)
         if not words
     }
     for path in (folder / "problems").glob("*/*.hdf5"):
-        if path not in wanted:
+        if path not in measures:
             path.unlink()
+    longer = {path_of(folder, rows[k]) for k in select.for_longer(rows, rule)}
+    failed: dict[str, str] = {}
     sources: dict[str, candidates.Candidates] = {}
-    for path, row in wanted.items():
-        if path.is_file():
-            continue
+    for path, row in measures.items():
         name = select.folder_of(row)
-        if name not in sources:
-            sources = {name: candidates.candidates_of(name, folder)}  # one at a time in memory
+        limits = [select.SHORT] + [select.LONG] * (path in longer)
+        done = all(select.share_solved(row, limit) is not None for limit in limits)
+        if done or path.is_file() or name in failed:
+            continue
         path.parent.mkdir(parents=True, exist_ok=True)
-        _core.write(path, sources[name].problem(int(row["number"])))
-    return len(wanted)
+        whose = name
+        try:
+            if name not in sources:
+                sources = {name: candidates.candidates_of(name, folder)}  # one in memory
+            whose = str(row["problem"])
+            problem = sources[name].problem(int(row["number"]))
+            if _digest.digest(problem) != row["digest"]:
+                raise ValueError("its data are not those of the table")
+            _core.write(path, problem)
+        except FAULTS as error:
+            failed[whose] = str(error)
+    return len(measures), failed
 
 
 def path_of(folder: Path, row: select.Row) -> Path:

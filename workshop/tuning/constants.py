@@ -165,6 +165,7 @@ RULES = [
     Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
+    Rules("own units", 0, ({}, {"range": 1}, {"range": 1e3}, {"range": 1e9})),
     *(Rules(HELD, k, ({},), kind) for kind in ("jammed", "crowded") for k in range(2)),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
 ]

@@ -35,6 +35,21 @@ TEST(BlockMatrix, agrees_with_the_matrix_it_is_made_from) {
   }
 }
 
+TEST(BlockMatrix, rows_and_columns_are_scaled) {
+  testing::RandomData random(9);
+  for (const bool dense : {false, true}) {
+    const SparseColumns source = dense ? random.sparse(12, 12, 0.9) : random.sparse(60, 60, 0.02);
+    const BlockMatrix a(Matrix::from_eigen(source), 3);
+    ASSERT_EQ(a.dense(), dense);
+    const Vector factors = random.vector(source.rows());
+    const Vector x = random.vector(source.rows());
+    Vector y;
+    a.scaled(factors).multiply_add(x, Vector::Zero(x.size()), y);
+    const Vector expected = factors.cwiseProduct(source * factors.cwiseProduct(x));
+    EXPECT_LT((y - expected).norm(), 1e-13) << dense;
+  }
+}
+
 template <int D>
 void expect_same_bits(int threads) {
   testing::RandomData random(5);

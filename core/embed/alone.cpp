@@ -9,14 +9,17 @@ namespace {
 using Wide = Eigen::Array<double, 4, 1>;
 
 template <class>
-EIGEN_ALWAYS_INLINE Wide gather(const double* const* at) {
-  return {*at[0], *at[1], *at[2], *at[3]};
+constexpr int lanes_of = 4;
+
+template <class>
+EIGEN_ALWAYS_INLINE Wide gather(const double* const* at, int i) {
+  return {at[0][i], at[1][i], at[2][i], at[3][i]};
 }
 
-EIGEN_ALWAYS_INLINE void gather_two(const double* const* at, Wide& first, Wide& second) {
+EIGEN_ALWAYS_INLINE void gather_two(const double* const* at, int i, Wide& first, Wide& second) {
   for (int k = 0; k < 4; ++k) {
-    first[k] = at[k][0];
-    second[k] = at[k][1];
+    first[k] = at[k][i];
+    second[k] = at[k][i + 1];
   }
 }
 

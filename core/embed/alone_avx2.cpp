@@ -53,9 +53,59 @@ struct Four {
   FCLIB_IN_LANES void operator*=(const Four& b) { x = _mm256_mul_pd(x, b.x); }
 };
 
-template <class>
-FCLIB_IN_LANES Four gather(const double* const* at) {
-  return _mm256_setr_pd(*at[0], *at[1], *at[2], *at[3]);
+/// Eight of them: what one half waits for, the other half computes.
+struct Eight {
+  Four low, high;
+
+  FCLIB_IN_LANES Eight() {}
+  FCLIB_IN_LANES Eight(const Eight& other) : low(other.low), high(other.high) {}
+  FCLIB_IN_LANES Eight& operator=(const Eight& other) {
+    low = other.low;
+    high = other.high;
+    return *this;
+  }
+  FCLIB_IN_LANES Eight(const Four& a, const Four& b) : low(a), high(b) {}
+  FCLIB_IN_LANES Eight(double all) : low(all), high(all) {}
+  FCLIB_IN_LANES static Eight Zero() { return {Four::Zero(), Four::Zero()}; }
+  FCLIB_IN_LANES static Eight Constant(double all) { return all; }
+
+  FCLIB_IN_LANES Eight max(const Eight& other) const {
+    return {low.max(other.low), high.max(other.high)};
+  }
+  FCLIB_IN_LANES Eight min(const Eight& other) const {
+    return {low.min(other.low), high.min(other.high)};
+  }
+  FCLIB_IN_LANES Eight abs() const { return {low.abs(), high.abs()}; }
+  FCLIB_IN_LANES Eight sqrt() const { return {low.sqrt(), high.sqrt()}; }
+  FCLIB_IN_LANES Eight inverse() const { return {low.inverse(), high.inverse()}; }
+
+  FCLIB_IN_LANES friend Eight operator+(const Eight& a, const Eight& b) {
+    return {a.low + b.low, a.high + b.high};
+  }
+  FCLIB_IN_LANES friend Eight operator-(const Eight& a, const Eight& b) {
+    return {a.low - b.low, a.high - b.high};
+  }
+  FCLIB_IN_LANES friend Eight operator*(const Eight& a, const Eight& b) {
+    return {a.low * b.low, a.high * b.high};
+  }
+  FCLIB_IN_LANES friend Eight operator/(const Eight& a, const Eight& b) {
+    return {a.low / b.low, a.high / b.high};
+  }
+  FCLIB_IN_LANES void operator+=(const Eight& b) { *this = *this + b; }
+  FCLIB_IN_LANES void operator-=(const Eight& b) { *this = *this - b; }
+  FCLIB_IN_LANES void operator*=(const Eight& b) { *this = *this * b; }
+};
+
+template <class Wide>
+constexpr int lanes_of = sizeof(Wide) / sizeof(double);
+
+template <class Wide>
+FCLIB_IN_LANES Wide gather(const double* const* at, int i) {
+  if constexpr (lanes_of<Wide> == 8) {
+    return {gather<Four>(at, i), gather<Four>(at + 4, i)};
+  } else {
+    return _mm256_setr_pd(at[0][i], at[1][i], at[2][i], at[3][i]);
+  }
 }
 
 /// The halves of two lanes' pairs, one behind the other.
@@ -63,11 +113,16 @@ FCLIB_IN_LANES __m256d two_pairs(const double* low, const double* high) {
   return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(low)), _mm_loadu_pd(high), 1);
 }
 
-FCLIB_IN_LANES void gather_two(const double* const* at, Four& first, Four& second) {
-  const __m256d even = two_pairs(at[0], at[2]);
-  const __m256d odd = two_pairs(at[1], at[3]);
+FCLIB_IN_LANES void gather_two(const double* const* at, int i, Four& first, Four& second) {
+  const __m256d even = two_pairs(at[0] + i, at[2] + i);
+  const __m256d odd = two_pairs(at[1] + i, at[3] + i);
   first = _mm256_unpacklo_pd(even, odd);
   second = _mm256_unpackhi_pd(even, odd);
+}
+
+FCLIB_IN_LANES void gather_two(const double* const* at, int i, Eight& first, Eight& second) {
+  gather_two(at, i, first.low, second.low);
+  gather_two(at + 4, i, first.high, second.high);
 }
 
 template <int D>
@@ -93,8 +148,24 @@ FCLIB_IN_LANES void scatter(const Four* x, double* to) {
   }
 }
 
+template <int D>
+FCLIB_IN_LANES void scatter(const Eight* x, double* to) {
+  Four low[D];
+  Four high[D];
+  for (int i = 0; i < D; ++i) {
+    low[i] = x[i].low;
+    high[i] = x[i].high;
+  }
+  scatter<D>(low, to);
+  scatter<D>(high, to + 4 * D);
+}
+
 FCLIB_IN_LANES unsigned at_most(const Four& a, const Four& b) {
   return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a.x, b.x, _CMP_LE_OQ)));
+}
+
+FCLIB_IN_LANES unsigned at_most(const Eight& a, const Eight& b) {
+  return at_most(a.low, b.low) | at_most(a.high, b.high) << 4;
 }
 
 }  // namespace
@@ -108,13 +179,13 @@ namespace fclib {
 template <>
 FCLIB_AVX2_CODE void solve_alone_avx2<2>(double tolerance, int count, const LocalArrays& first,
                                          Alone& found) {
-  solve_all_alone<2, Four>(tolerance, count, first, found);
+  solve_all_alone<2, Eight>(tolerance, count, first, found);
 }
 
 template <>
 FCLIB_AVX2_CODE void solve_alone_avx2<3>(double tolerance, int count, const LocalArrays& first,
                                          Alone& found) {
-  solve_all_alone<3, Four>(tolerance, count, first, found);
+  solve_all_alone<3, Eight>(tolerance, count, first, found);
 }
 
 }  // namespace fclib

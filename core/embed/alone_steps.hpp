@@ -1,7 +1,8 @@
 // How contacts without others are solved in lanes; see lane_steps.hpp. Who includes this has, for
 // its Wide, the functions
-//     gather<Wide>(at)           the number at each of four places
-//     gather_two(at, a, b)       the numbers there, and those behind them
+//     lanes_of<Wide>             how many it has
+//     gather<Wide>(at, i)        number i behind the place of each lane
+//     gather_two(at, i, a, b)    the same, and those behind them
 //     scatter<D>(x, to)          D numbers of each lane, one lane behind the other
 //     at_most(a, b)              a bit of each lane in which a <= b, so that there is no NaN
 #pragma once
@@ -17,29 +18,23 @@ namespace fclib {
 inline constexpr int most_steps_alone = 2;
 /// A contact that approaches at less than this speed has no guess.
 inline constexpr double smallest_speed = 1e-300;
-inline constexpr int lanes_alone = 4;
 
 /// N numbers of each contact; behind the last contact it comes again.
 template <int N, class Wide>
 FCLIB_IN_LANES void gather_all(const double* values, int count, Wide* x) {
-  const double* at[lanes_alone];
-  for (int k = 0; k < lanes_alone; ++k) at[k] = values + N * (k < count ? k : count - 1);
-  for (int i = 0; i + 1 < N; i += 2) {
-    const double* const from[] = {at[0] + i, at[1] + i, at[2] + i, at[3] + i};
-    gather_two(from, x[i], x[i + 1]);
-  }
-  if constexpr (N % 2 == 1) {
-    const double* const from[] = {at[0] + N - 1, at[1] + N - 1, at[2] + N - 1, at[3] + N - 1};
-    x[N - 1] = gather<Wide>(from);
-  }
+  constexpr int width = lanes_of<Wide>;
+  const double* at[width];
+  for (int k = 0; k < width; ++k) at[k] = values + N * (k < count ? k : count - 1);
+  for (int i = 0; i + 1 < N; i += 2) gather_two(at, i, x[i], x[i + 1]);
+  if constexpr (N % 2 == 1) x[N - 1] = gather<Wide>(at, N - 1);
 }
 
 /// The same as scatter, of the lanes that have a bit.
 template <int D, class Wide>
 FCLIB_IN_LANES void scatter_some(unsigned lanes, const Wide* x, double* to) {
-  double all[D * lanes_alone];
+  double all[D * lanes_of<Wide>];
   scatter<D>(x, all);
-  for (int k = 0; k < lanes_alone; ++k) {
+  for (int k = 0; k < lanes_of<Wide>; ++k) {
     if ((lanes >> k & 1U) == 0) continue;
     for (int i = D * k; i < D * (k + 1); ++i) to[i] = all[i];
   }
@@ -49,7 +44,7 @@ FCLIB_IN_LANES void scatter_some(unsigned lanes, const Wide* x, double* to) {
 template <int D, class Wide>
 FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
                                       const LocalArrays& first, Alone& found) {
-  const int here = count - start < lanes_alone ? count - start : lanes_alone;
+  const int here = count - start < lanes_of<Wide> ? count - start : lanes_of<Wide>;
   Wide W[D * D];
   Wide q[D];
   Wide r[D];
@@ -126,11 +121,11 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
     if (solved == 0) continue;
     left &= ~solved;
     found.solved |= solved << start;
-    for (int k = 0; k < lanes_alone; ++k) {
+    for (int k = 0; k < lanes_of<Wide>; ++k) {
       if ((solved >> k & 1U) == 0) continue;
       found.steps[static_cast<unsigned>(start + k)] = (opens >> k & 1U) != 0 ? 0 : steps;
     }
-    if (solved == (1U << lanes_alone) - 1) {
+    if (solved == (1U << lanes_of<Wide>) - 1) {
       scatter<1>(&bound, found.error.data() + start);
       scatter<D>(r, first.r + D * start);
       if (first.u != nullptr) scatter<D>(u, first.u + D * start);
@@ -146,7 +141,7 @@ template <int D, class Wide>
 FCLIB_IN_LANES void solve_all_alone(double tolerance, int count, const LocalArrays& first,
                                     Alone& found) {
   found.solved = 0;
-  for (int start = 0; start < count; start += lanes_alone) {
+  for (int start = 0; start < count; start += lanes_of<Wide>) {
     solve_lanes_alone<D, Wide>(tolerance, start, count, first, found);
   }
 }

@@ -60,7 +60,7 @@ template <int D>
 void solve_alone(double tolerance, int count, const LocalArrays& first, Alone& found) {
 #ifdef FCLIB_AVX2
   if (has_avx2()) {
-    solve_alone_avx2<D>(tolerance, count, first, found);
+    solve_alone_avx2(std::integral_constant<int, D>(), tolerance, count, first, found);
     return;
   }
 #endif

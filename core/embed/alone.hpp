@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 #include "embed/local_arrays.hpp"
 
@@ -17,10 +18,10 @@ namespace fclib {
 
 /// What becomes of contacts without others.
 struct Alone {
-  static constexpr int most = 32;     ///< contacts in a call
-  std::uint32_t solved = 0;           ///< a bit of each; others are for SmallSolver
-  std::array<double, most> error;     ///< at least the merit's error of those that are solved, and
-                                      ///< at most a thousandth of the tolerance above it
+  static constexpr int most = 32;  ///< contacts in a call
+  std::uint32_t solved = 0;        ///< a bit of each; others are for SmallSolver
+  std::array<double, most> error;  ///< at least the merit's error of those that are solved, and
+                                   ///< at most a thousandth of the tolerance above it
   std::array<std::int32_t, most> steps;  ///< ... and how many steps each took
 };
 
@@ -34,9 +35,11 @@ template <int D>
 void solve_alone_anywhere(double tolerance, int count, const LocalArrays& first, Alone& found);
 
 #ifdef FCLIB_AVX2
-/// The same, on a processor with AVX2.
-template <int D>
-void solve_alone_avx2(double tolerance, int count, const LocalArrays& first, Alone& found);
+/// The same, on a processor with AVX2; no templates, as g++ forgets the processor of those.
+void solve_alone_avx2(std::integral_constant<int, 2> dimension, double tolerance, int count,
+                      const LocalArrays& first, Alone& found);
+void solve_alone_avx2(std::integral_constant<int, 3> dimension, double tolerance, int count,
+                      const LocalArrays& first, Alone& found);
 /// Whether this processor has it.
 bool has_avx2();
 #endif

@@ -176,15 +176,13 @@ FCLIB_IN_LANES unsigned at_most(const Eight& a, const Eight& b) {
 
 namespace fclib {
 
-template <>
-FCLIB_AVX2_CODE void solve_alone_avx2<2>(double tolerance, int count, const LocalArrays& first,
-                                         Alone& found) {
+FCLIB_AVX2_CODE void solve_alone_avx2(std::integral_constant<int, 2>, double tolerance, int count,
+                                      const LocalArrays& first, Alone& found) {
   solve_all_alone<2, Eight>(tolerance, count, first, found);
 }
 
-template <>
-FCLIB_AVX2_CODE void solve_alone_avx2<3>(double tolerance, int count, const LocalArrays& first,
-                                         Alone& found) {
+FCLIB_AVX2_CODE void solve_alone_avx2(std::integral_constant<int, 3>, double tolerance, int count,
+                                      const LocalArrays& first, Alone& found) {
   solve_all_alone<3, Eight>(tolerance, count, first, found);
 }
 

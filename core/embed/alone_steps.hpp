@@ -13,9 +13,9 @@
 
 namespace fclib {
 
-/// A contact without others that so many steps do not solve has tangents that differ, or a normal
-/// that they change.
-inline constexpr int most_steps_alone = 2;
+/// What so many steps do not solve is for SmallSolver. workshop/tuning/constants.py ("alone") has
+/// tried other numbers.
+inline constexpr int most_steps_alone = 32;
 /// A contact that approaches at less than this speed has no guess.
 inline constexpr double smallest_speed = 1e-300;
 
@@ -125,7 +125,7 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
       if ((solved >> k & 1U) == 0) continue;
       found.steps[static_cast<unsigned>(start + k)] = (opens >> k & 1U) != 0 ? 0 : steps;
     }
-    if (solved == (1U << lanes_of<Wide>) - 1) {
+    if (solved == (1U << lanes_of<Wide>)-1) {
       scatter<1>(&bound, found.error.data() + start);
       scatter<D>(r, first.r + D * start);
       if (first.u != nullptr) scatter<D>(u, first.u + D * start);

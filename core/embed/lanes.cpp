@@ -12,8 +12,10 @@ namespace fclib {
 
 namespace {
 
-/// A sweep in lanes costs this part of one of a problem alone.
+/// A sweep in lanes costs this part of one of a problem alone. workshop/tuning/constants.py
+/// ("batches") has tried other numbers.
 constexpr double part_of_sweep = 0.3;
+
 /// Whether W (m x m) of `nc` contacts has no block of zeros. Else it may have islands, and there is
 /// less to compute.
 template <int D>

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <type_traits>
 #include <vector>
 
 #include "embed/rounding.hpp"
@@ -26,7 +27,9 @@ struct Contacts {
     std::mt19937_64 engine(seed);
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> uniform;
-    const auto scale = [&](double most) { return std::pow(10.0, most * (2 * uniform(engine) - 1)); };
+    const auto scale = [&](double most) {
+      return std::pow(10.0, most * (2 * uniform(engine) - 1));
+    };
     for (int k = 0; k < count; ++k) {
       const double size = k % 3 == 0 ? 1 : scale(k % 3 == 1 ? 2 : 120);
       double h[D][D];
@@ -50,9 +53,17 @@ struct Contacts {
       mu.push_back(uniform(engine) < 0.2 ? 0 : scale(k % 4 == 0 ? 120 : 1));
     }
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    constexpr double special[] = {std::numeric_limits<double>::quiet_NaN(), infinity, -infinity,
-                                  0.0, -0.0, std::numeric_limits<double>::denorm_min(), -1e-310,
-                                  std::numeric_limits<double>::max(), -1.0, 1e-300, 1e200};
+    constexpr double special[] = {std::numeric_limits<double>::quiet_NaN(),
+                                  infinity,
+                                  -infinity,
+                                  0.0,
+                                  -0.0,
+                                  std::numeric_limits<double>::denorm_min(),
+                                  -1e-310,
+                                  std::numeric_limits<double>::max(),
+                                  -1.0,
+                                  1e-300,
+                                  1e200};
     for (auto* values : {&W, &q, &mu, &guess}) {
       for (double& one : *values) {
         if (uniform(engine) < part_special) one = special[engine() % std::size(special)];
@@ -64,8 +75,9 @@ struct Contacts {
   }
 
   LocalArrays arrays(bool guessed, bool velocities) {
-    return {W.data(), q.data(), mu.data(), guessed ? guess.data() : nullptr, r.data(),
-            velocities ? u.data() : nullptr};
+    return {W.data(),  q.data(),
+            mu.data(), guessed ? guess.data() : nullptr,
+            r.data(),  velocities ? u.data() : nullptr};
   }
 };
 
@@ -90,7 +102,8 @@ void compare() {
     Alone a;
     Alone b;
     solve_alone_anywhere<D>(tolerance, count, here.arrays(guessed, velocities), a);
-    solve_alone_avx2<D>(tolerance, count, there.arrays(guessed, velocities), b);
+    solve_alone_avx2(std::integral_constant<int, D>(), tolerance, count,
+                     there.arrays(guessed, velocities), b);
     ASSERT_EQ(a.solved, b.solved) << seed;
     ASSERT_EQ(bits(here.r), bits(there.r)) << seed;
     ASSERT_EQ(bits(here.u), bits(there.u)) << seed;

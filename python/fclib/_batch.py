@@ -83,9 +83,9 @@ class Law:
     def check(self, spacedim: object) -> None:
         """ProblemError if the law has no contacts of so many components."""
         rolls, spins = self.mu_r is not None, self.mu_s is not None
-        if not (rolls or spins) and self.coupled is False and type(spacedim) is int:
-            if spacedim in (2, 3):
-                return
+        plain = not (rolls or spins) and self.coupled is False and type(spacedim) is int
+        if plain and spacedim in (2, 3):
+            return
         known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}
         fits = known.get((rolls, spins), (6,))
         if not isinstance(spacedim, (int, Integral)) or spacedim not in fits:

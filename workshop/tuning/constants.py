@@ -145,9 +145,9 @@ CONSTANTS = [
             ("most_projections", "sweep_rule"),
             ("few_newton_steps", "sweep_rule"),
             ("near_end", "sweep_rule"),
-            ("part_of_sweep", "lanes"),
         )
     ),
+    varied("part_of_sweep", "batches", 0.15, 0.6, 1, source="embed/lanes.cpp"),
     varied("most_steps_alone", "alone", 2, 8, 16, 64, 128, source="embed/alone_steps.hpp"),
 ]
 
@@ -354,7 +354,7 @@ def build(constant: Constant, value: str, folder: Path) -> None:
     given = folder / "headers" / constant.source if header else folder / "changed.cpp"
     given.parent.mkdir(parents=True, exist_ok=True)
     given.write_text(changed, encoding="utf-8")
-    objects = []
+    objects: list[str] = []
     for source in users_of(constant.source) if header else [constant.source]:
         made = folder / f"changed{len(objects)}.o"
         words = shlex.split(command_of(source))

@@ -178,12 +178,12 @@ namespace fclib {
 
 FCLIB_AVX2_CODE void solve_alone_avx2(std::integral_constant<int, 2>, double tolerance, int count,
                                       const LocalArrays& first, Alone& found) {
-  solve_all_alone<2, Eight>(tolerance, count, first, found);
+  solve_all_alone<2, Eight, Four>(tolerance, count, first, found);
 }
 
 FCLIB_AVX2_CODE void solve_alone_avx2(std::integral_constant<int, 3>, double tolerance, int count,
                                       const LocalArrays& first, Alone& found) {
-  solve_all_alone<3, Eight>(tolerance, count, first, found);
+  solve_all_alone<3, Eight, Four>(tolerance, count, first, found);
 }
 
 }  // namespace fclib

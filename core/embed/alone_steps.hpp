@@ -137,13 +137,16 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
   }
 }
 
-template <int D, class Wide>
+/// `Few` is for a rest that it has lanes for.
+template <int D, class Wide, class Few = Wide>
 FCLIB_IN_LANES void solve_all_alone(double tolerance, int count, const LocalArrays& first,
                                     Alone& found) {
   found.solved = 0;
-  for (int start = 0; start < count; start += lanes_of<Wide>) {
+  int start = 0;
+  for (; count - start > lanes_of<Few>; start += lanes_of<Wide>) {
     solve_lanes_alone<D, Wide>(tolerance, start, count, first, found);
   }
+  if (start < count) solve_lanes_alone<D, Few>(tolerance, start, count, first, found);
 }
 
 }  // namespace fclib

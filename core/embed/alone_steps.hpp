@@ -16,6 +16,9 @@ namespace fclib {
 /// What so many steps do not solve is for SmallSolver. workshop/tuning/constants.py ("alone") has
 /// tried other numbers.
 inline constexpr int most_steps_alone = 32;
+/// After so many steps, and after twice as many, and so on, a contact is left to SmallSolver at
+/// once if its rate says that it needs more steps than these. Tried there too.
+inline constexpr int first_look = 8;
 /// A contact that approaches at less than this speed has no guess.
 inline constexpr double smallest_speed = 1e-300;
 
@@ -76,6 +79,7 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
   // all of them have squares that are safe; what is not finite makes the bound NaN
   const Wide lower = W[0].min(most).min(mean).min(square);
   const Wide upper = mean.max(square);
+  Wide looked_at = Wide::Zero();  // the error when it was looked at last
   unsigned left = (1U << here) - 1;
   left &= at_most(Wide::Constant(smallest_size), lower) &
           at_most(upper, Wide::Constant(largest_size)) & at_most(Wide::Zero(), mu);
@@ -118,8 +122,18 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
     const Wide bound = error + rounding;
     const unsigned solved = left & at_most(rounding, Wide::Constant(bounded_excess * tolerance)) &
                             at_most(bound, Wide::Constant(tolerance));
-    if (solved == 0) continue;
     left &= ~solved;
+    if (steps >= first_look / 2 && (steps & (steps - 1)) == 0) {
+      if (steps >= first_look) {
+        // as it has gone since half as many steps, it goes on
+        const Wide part = error / looked_at;
+        Wide foreseen = error;
+        for (int k = steps; k < most_steps_alone; k += steps / 2) foreseen = foreseen * part;
+        left &= at_most(foreseen, Wide::Constant(tolerance));
+      }
+      looked_at = error;
+    }
+    if (solved == 0) continue;
     found.solved |= solved << start;
     for (int k = 0; k < lanes_of<Wide>; ++k) {
       if ((solved >> k & 1U) == 0) continue;

@@ -38,6 +38,11 @@ def corner(rng: np.random.Generator) -> World:
     return _world([(center, half, np.exp(rng.uniform(-1, 1)))], [(-1, 0, point)])
 
 
+def linked(rng: np.random.Generator) -> World:
+    """A contact of a mechanism: light in some directions, heavy in others, and all are coupled."""
+    return World(rng.normal(size=(6, 3)), np.exp(3 * rng.normal(size=6)))
+
+
 def tower(rng: np.random.Generator, boxes: int) -> World:
     """Boxes on each other, four contacts under each."""
     places, contacts = [], []
@@ -101,6 +106,7 @@ def apart(worlds: Sequence[World]) -> World:
 SCENES = {
     "1": sphere,
     "1 at a corner": corner,
+    "1 of a mechanism": linked,
     "4": lambda rng: tower(rng, 1),
     "8": lambda rng: tower(rng, 2),
     "16": lambda rng: tower(rng, 4),

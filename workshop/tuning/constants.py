@@ -15,7 +15,7 @@ other pages have larger numbers):
     jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
     crowded     the FILEs of the families to choose on that come to this stage: most bodies move
     batches     boxes of 4 to 64 contacts, in batches, cold and warm, to four tolerances
-    alone       boxes on a corner and spheres, one contact each, likewise
+    alone       boxes on a corner, mechanisms and spheres, one contact each, likewise
 
 A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
 times; of digits the least of three runs, of batches of more. A FILE or a packing has a limit of
@@ -148,7 +148,8 @@ CONSTANTS = [
         )
     ),
     varied("part_of_sweep", "batches", 0.15, 0.6, 1, source="embed/lanes.cpp"),
-    varied("most_steps_alone", "alone", 2, 8, 16, 64, 128, source="embed/alone_steps.hpp"),
+    varied("most_steps_alone", "alone", 2, 16, 64, 128, source="embed/alone_steps.hpp"),
+    varied("first_look", "alone", 2, 4, 16, 32, source="embed/alone_steps.hpp"),
 ]
 
 
@@ -186,7 +187,7 @@ PACKINGS = [  # contacts, push, seed
 # how many of each kind take about as long
 BATCHES = {
     "batches": {"4": 1200, "8": 200, "16": 50, "64": 6},
-    "alone": {"1 at a corner": 50000, "1": 8000},
+    "alone": {"1 at a corner": 50000, "1 of a mechanism": 20000, "1": 8000},
 }
 BATCH_SEED = 7  # another one than that of small_problems.py
 BATCH_TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
@@ -491,7 +492,7 @@ def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
         "name.",
         "crowded": "Crowded ones: files of the families to choose on that come to these stages.",
         "batches": f"Batches: boxes of 4 to 64 contacts, {like_batches}",
-        "alone": f"Contacts alone: boxes on a corner and spheres, {like_batches}",
+        "alone": f"Contacts alone: boxes on a corner, mechanisms and spheres, {like_batches}",
     }
     return " ".join(text for kind, text in told.items() if kind in kinds)
 

@@ -212,6 +212,19 @@ class Runner {
     outcome.converged += status == Status::converged ? 1 : 0;
   }
 
+  /// The same of contacts without others that are solved, from `first` on.
+  void write_solved(std::int64_t first, int count, const Alone& found,
+                    BatchOutcome& outcome) const {
+    constexpr auto number = static_cast<std::int32_t>(Status::converged);
+    const std::int32_t status = batch_.codes != nullptr ? batch_.codes[number] : number;
+    if (batch_.status != nullptr) std::fill_n(batch_.status + first, count, status);
+    if (batch_.error != nullptr) std::copy_n(found.error.data(), count, batch_.error + first);
+    if (batch_.iterations != nullptr) {
+      std::copy_n(found.steps.data(), count, batch_.iterations + first);
+    }
+    outcome.converged += count;
+  }
+
   /// Whether each problem has a lane: they have the same few contacts, and W is dense.
   [[nodiscard]] bool in_lanes() const {
     return !varies() && batch_.M == nullptr && batch_.starts == nullptr && batch_.nc_each > 0 &&
@@ -242,16 +255,25 @@ class Runner {
         solve_one(first + k, from(k), way, polls, outcome, answer);
       }
     };
-    auto& lanes = way.lanes();
     if (batch_.nc_each > 1) {
-      lanes.solve(settings_.tolerance, batch_.nc_each, last - first, arrays(place), answered);
+      way.lanes().solve(settings_.tolerance, batch_.nc_each, last - first, arrays(place), answered);
       return;
     }
-    constexpr int width = Lanes<3>::width;
-    for (std::int64_t k = 0; k < last - first; k += width) {
-      const int count = static_cast<int>(std::min<std::int64_t>(width, last - first - k));
-      const auto answers = lanes.solve_alone(settings_.tolerance, count, arrays(from(k)));
-      for (int j = 0; j < count; ++j) answered(k + j, answers[static_cast<std::size_t>(j)]);
+    static_assert(chunk <= Alone::most);
+    const int count = static_cast<int>(last - first);
+    Alone found;
+    Way::solve_alone(settings_.tolerance, count, arrays(place), found);
+    if (found.solved == (std::uint64_t{1} << count) - 1) {
+      write_solved(first, count, found, outcome);
+      return;
+    }
+    for (int k = 0; k < count; ++k) {
+      const auto at = static_cast<unsigned>(k);
+      if ((found.solved >> at & 1U) != 0) {
+        write(first + k, Status::converged, found.error[at], found.steps[at], outcome);
+      } else {
+        solve_one(first + k, from(k), way, polls, outcome);
+      }
     }
   }
 

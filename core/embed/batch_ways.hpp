@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "convert/complete.hpp"
+#include "embed/alone.hpp"
 #include "embed/body_form.hpp"
 #include "embed/lanes.hpp"
 #include "embed/small_solver.hpp"
@@ -125,6 +126,9 @@ class SmallWay {
   /// Problems of few contacts are solved several at once.
   static constexpr bool has_lanes = true;
   Lanes<D>& lanes() { return lanes_; }
+  static void solve_alone(double tolerance, int count, const LocalArrays& first, Alone& found) {
+    fclib::solve_alone<D>(tolerance, count, first, found);
+  }
 
   /// As SmallSolver::start_behind.
   void start_behind(const SweptStart& start) { solver_.start_behind(start); }

@@ -262,8 +262,10 @@ class OneContact {
   void sensitivities(double* by_q, double* by_mu) const;
 
  private:
-  /// S is well conditioned if its determinant is at least this part of its columns' lengths.
-  static constexpr double part = 1e-3;
+  /// S is well conditioned if its determinant is at least this part of its columns' lengths. This
+  /// only says which of two ways is taken, as far as both have digits enough: a test solves the
+  /// same contacts beside another one, which is Point's way, and the derivatives agree.
+  static constexpr double well_conditioned = 1e-3;
 
   bool stick(double rho);
   bool slide(double rho, double mu, double speed, const double* u);
@@ -336,7 +338,7 @@ bool OneContact<D>::stick(double rho) {
   }
   double determinant = 0;
   for (int j = 0; j < D; ++j) determinant += S[0][j] * G_[j][0];
-  if (!(determinant * determinant > part * part * lengths)) return false;
+  if (!(determinant * determinant > well_conditioned * well_conditioned * lengths)) return false;
   const double scale = -rho / determinant;
   for (auto& row : G_) {
     for (double& entry : row) entry *= scale;
@@ -365,7 +367,7 @@ bool OneContact<D>::slide(double rho, double mu, double speed, const double* u) 
   double by_n = rho * W[0] * rho * W[0] + mu * mu;
   double by_t = rho * Wt[0] * rho * Wt[0] + 1;
   if constexpr (D == 2) {
-    if (!(K_aa * K_aa > part * part * by_n * by_t)) return false;
+    if (!(K_aa * K_aa > well_conditioned * well_conditioned * by_n * by_t)) return false;
     G_[0][0] = -rho / K_aa;
     G_[0][1] = G_[1][1] = 0;
     G_[1][0] = -mu * t[1] * G_[0][0];
@@ -383,7 +385,8 @@ bool OneContact<D>::slide(double rho, double mu, double speed, const double* u) 
     by_n += c * sWn * c * sWn;
     // of both tangents, the mean: the columns along the axes are not longer together
     by_t = (by_t + c * sWt * c * sWt + K_ab * K_ab + K_bb * K_bb) / 2;
-    if (!(determinant * determinant > part * part * by_n * by_t * by_t)) return false;
+    if (!(determinant * determinant > well_conditioned * well_conditioned * by_n * by_t * by_t))
+      return false;
     const double inverse = 1 / determinant;
     const double a_n = -K_bb * rho * inverse;
     const double a_s = K_ab * c * inverse;

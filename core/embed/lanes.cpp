@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "embed/lane_steps.hpp"
 #include "embed/rounding.hpp"
 #include "error_size.hpp"
 
@@ -11,42 +12,9 @@ namespace fclib {
 
 namespace {
 
-/// A sweep in lanes costs this part of one of a problem alone.
+/// A sweep in lanes costs this part of one of a problem alone. workshop/tuning/constants.py
+/// ("batches") has tried other numbers.
 constexpr double part_of_sweep = 0.3;
-/// A contact without others that so many steps do not solve has tangents that differ, or a normal
-/// that they change.
-constexpr int most_steps_alone = 2;
-/// A contact that approaches at less than this speed has no guess.
-constexpr double smallest_speed = 1e-300;
-/// Instead of 0 in a denominator.
-constexpr double tiny = 1e-300;
-
-template <int D, class Wide>
-EIGEN_ALWAYS_INLINE Wide tangential_norm(const Wide* x) {
-  Wide square = x[1] * x[1];
-  if constexpr (D == 3) square += x[2] * x[2];
-  return square.sqrt();
-}
-
-/// The square of the natural map with rho, as in contact/coulomb.hpp, in each lane. The projection
-/// is chosen by minima and maxima, without a branch. Its rounding is that of u^ = u + mu ||u_T||.
-template <int D, class Wide>
-EIGEN_ALWAYS_INLINE Wide map_square(const Wide& mu, const Wide& over, const Wide& slip,
-                                    const Wide& rho, const Wide* u, const Wide* r) {
-  Wide y[D];
-  for (int i = 1; i < D; ++i) y[i] = r[i] - rho * u[i];
-  y[0] = r[0] - rho * (u[0] + slip);
-  const Wide norm = tangential_norm<D>(y);
-  const Wide normal = ((y[0] + mu * norm) * over).max(y[0]).max(Wide::Zero());
-  const Wide scale = (mu * normal / norm.max(tiny)).min(1.0);
-  const Wide left = r[0] - normal;
-  Wide square = left * left;
-  for (int i = 1; i < D; ++i) {
-    const Wide by = r[i] - scale * y[i];
-    square += by * by;
-  }
-  return square;
-}
 
 /// Whether W (m x m) of `nc` contacts has no block of zeros. Else it may have islands, and there is
 /// less to compute.
@@ -82,106 +50,7 @@ EIGEN_ALWAYS_INLINE void add_rows(int m, const double* rows, const double* q, co
   }
 }
 
-/// r moved against u, and put on the disk of its normal part.
-template <int D, class Wide>
-EIGEN_ALWAYS_INLINE void projected_step(const Wide& normal, const Wide& tangent, const Wide& mu,
-                                        const Wide* u, Wide* r) {
-  r[0] = (r[0] - normal * u[0]).max(0.0);
-  for (int i = 1; i < D; ++i) r[i] -= tangent * u[i];
-  const Wide scale = (mu * r[0] / tangential_norm<D>(r).max(tiny)).min(1.0);
-  for (int i = 1; i < D; ++i) r[i] *= scale;
-}
-
 }  // namespace
-
-template <int D>
-std::array<typename Lanes<D>::Answer, Lanes<D>::width> Lanes<D>::solve_alone(
-    double tolerance, int count, const LocalArrays& first) {
-  std::array<Answer, width> answers;
-  // of each lane; behind the last problem it comes again
-  const auto spread = [count](const double* values, int by) {
-    const auto at = [=](int k) { return values[by * std::min(k, count - 1)]; };
-    return Wide(at(0), at(1), at(2), at(3));
-  };
-  Wide W[D * D];
-  Wide q[D];
-  Wide r[D];
-  for (int i = 0; i < D * D; ++i) W[i] = spread(first.W + i, D * D);
-  for (int i = 0; i < D; ++i) q[i] = spread(first.q + i, D);
-  const Wide mu = spread(first.mu, 1);
-  Wide unread = Wide::Zero();  // NaN if the guess is not finite: a maximum may lose that
-  // r = 0 if the contact opens, else the guess; a speed next to nothing is between them
-  const Wide closing = (q[0] * (-1 / smallest_speed)).max(0.0).min(1.0);
-  for (int i = 0; i < D; ++i) {
-    r[i].setZero();
-    if (first.guess == nullptr) continue;
-    const Wide guess = spread(first.guess + i, D);
-    unread += guess * 0.0;
-    r[i] = guess * closing;
-  }
-  Wide sizes = W[0].abs();
-  Wide most = W[D + 1];
-  Wide square = q[0] * q[0];
-  for (int i = 1; i < D; ++i) {
-    sizes += W[(D + 1) * i].abs();
-    most = most.max(W[(D + 1) * i]);
-    square += q[i] * q[i];
-  }
-  const Wide mean = sizes * (1.0 / D);
-  // all of them have squares that are safe; what is not finite makes the bound NaN
-  const Wide lower = W[0].min(most).min(mean).min(square);
-  const Wide upper = mean.max(square);
-  const Wide normal = W[0].inverse();
-  const Wide tangent = most.inverse();
-  const Wide over = (mu * mu + 1).inverse();
-  const Wide over_square = square.inverse();
-  const Wide over_scale = over_square.sqrt();
-  // rho = 1 gives ||F|| as a velocity, and so does F_rho / rho. The less rho is, the larger it is.
-  const Wide over_rho = mean.max(1.0);
-  const Wide rho = over_rho.inverse();
-  const double unit = unit_of_rounding<D>(1);
-  Wide u[D];
-  for (int i = 0; i < D; ++i) {
-    u[i] = q[i];
-    for (int j = 0; j < D && first.guess != nullptr; ++j) u[i] += W[D * i + j] * r[j];
-  }
-  unsigned left = (1U << count) - 1;
-  for (int steps = 1; steps <= most_steps_alone && left != 0; ++steps) {
-    projected_step<D>(normal, tangent, mu, u, r);
-    // and the sizes of the terms of u, of the slip that is rounding and of r
-    Wide terms = unread;
-    Wide lengths = Wide::Zero();
-    for (int i = 0; i < D; ++i) {
-      u[i] = q[i];
-      terms += q[i].abs() * 2;
-      for (int j = 0; j < D; ++j) {
-        const Wide product = W[D * i + j] * r[j];
-        u[i] += product;
-        terms += product.abs();
-      }
-      lengths += r[i].abs();
-    }
-    const Wide slip = mu * tangential_norm<D>(u);
-    const Wide map = map_square<D>(mu, over, slip, rho, u, r) * (over_rho * over_rho);
-    const Wide down = u[0].min(0.0);
-    const Wide error = (map.max(down * down) * over_square).sqrt();
-    // as BoundedError has it; as an impulse the map is no more than as a velocity
-    const Wide rounding = unit * (error + (mu + 1) * (terms + lengths * over_rho) * over_scale);
-    const Wide bound = error + rounding;
-    for (int k = 0; k < count; ++k) {
-      if ((left >> k & 1U) == 0) continue;
-      if (!(rounding[k] <= bounded_excess * tolerance && bound[k] <= tolerance)) continue;
-      if (!(lower[k] >= smallest_size && upper[k] <= largest_size && mu[k] >= 0)) continue;
-      left &= ~(1U << k);
-      answers[k].solved = true;
-      answers[k].error = bound[k];
-      answers[k].sweeps = q[0][k] >= 0 ? 0 : steps;
-      for (int i = 0; i < D; ++i) first.r[D * k + i] = r[i][k];
-      for (int i = 0; i < D && first.u != nullptr; ++i) first.u[D * k + i] = u[i][k];
-    }
-  }
-  return answers;
-}
 
 template <int D>
 Lanes<D>::Lanes() {

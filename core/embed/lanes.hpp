@@ -12,21 +12,11 @@
 #include <cstdint>
 #include <limits>
 
+#include "embed/local_arrays.hpp"
 #include "embed/sweep_rule.hpp"
 #include "linalg/matrix.hpp"
 
 namespace fclib {
-
-/// A local problem in the caller's arrays, or the first one of several: W (m x m, by rows), q, mu,
-/// the guess and u, which may be null, and r.
-struct LocalArrays {
-  const double* W;
-  const double* q;
-  const double* mu;
-  const double* guess;
-  double* r;
-  double* u;
-};
 
 template <int D>
 class Lanes {
@@ -42,11 +32,6 @@ class Lanes {
     /// At least the merit's error, and at most a thousandth of the tolerance above it.
     double error = std::numeric_limits<double>::infinity();
   };
-
-  /// Up to `width` contacts without others. r and u of those that a few steps do not solve, or that
-  /// have something that is not finite, stay as they were.
-  static std::array<Answer, width> solve_alone(double tolerance, int count,
-                                               const LocalArrays& first);
 
   /// Problems of `nc` contacts. Calls answered(k, answer) for each, in the order in which they
   /// end; those with a block of zeros in W are left to SmallSolver.

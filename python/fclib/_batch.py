@@ -17,6 +17,7 @@ from fclib._solve import check_limits, name_wrong_type
 from fclib._words import counted
 
 Floats: TypeAlias = npt.NDArray[np.float64]
+DOUBLE = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +83,9 @@ class Law:
     def check(self, spacedim: object) -> None:
         """ProblemError if the law has no contacts of so many components."""
         rolls, spins = self.mu_r is not None, self.mu_s is not None
+        plain = not (rolls or spins) and self.coupled is False and type(spacedim) is int
+        if plain and spacedim in (2, 3):
+            return
         known = {(False, False): (2, 3), (True, False): (3, 5), (False, True): (4,)}
         fits = known.get((rolls, spins), (6,))
         if not isinstance(spacedim, (int, Integral)) or spacedim not in fits:
@@ -457,6 +461,8 @@ def _are_masses(inverse: Floats) -> npt.NDArray[np.bool_]:
 
 def floats(name: str, values: Any) -> Floats:
     """A contiguous array of numbers; no copy if it is one already."""
+    if type(values) is np.ndarray and values.dtype is DOUBLE and values.flags.c_contiguous:
+        return values
     try:
         array = np.asarray(values)
     except ValueError:

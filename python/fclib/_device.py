@@ -86,7 +86,11 @@ class DeviceBatchResult:
 
 def on_device(*arrays: Any) -> bool:
     """Whether any of them is on a GPU."""
-    return any(_is_device(one) for one in arrays)
+    for one in arrays:
+        # most are such, and a small batch takes less time than a call for each
+        if one is not None and type(one) is not np.ndarray and _is_device(one):
+            return True
+    return False
 
 
 def _is_device(array: Any) -> bool:

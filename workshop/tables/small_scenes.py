@@ -29,6 +29,20 @@ def sphere(rng: np.random.Generator) -> World:
     return World(_arm(np.array([0, 0, -radius])).T, inverse)
 
 
+def corner(rng: np.random.Generator) -> World:
+    """A box that stands on a corner: one contact, and each component of u depends on all of r."""
+    half = np.array([0.1, 0.12, 0.08]) * np.exp(0.4 * rng.normal(size=3))
+    center = np.zeros(3)
+    sides = rng.choice([-1.0, 1.0], size=2)
+    point = np.array([*(sides * half[:2]), -half[2]])
+    return _world([(center, half, np.exp(rng.uniform(-1, 1)))], [(-1, 0, point)])
+
+
+def linked(rng: np.random.Generator) -> World:
+    """A contact of a mechanism: light in some directions, heavy in others, and all are coupled."""
+    return World(rng.normal(size=(6, 3)), np.exp(3 * rng.normal(size=6)))
+
+
 def tower(rng: np.random.Generator, boxes: int) -> World:
     """Boxes on each other, four contacts under each."""
     places, contacts = [], []
@@ -91,6 +105,8 @@ def apart(worlds: Sequence[World]) -> World:
 # contacts, how they hang together, how a world is made
 SCENES = {
     "1": sphere,
+    "1 at a corner": corner,
+    "1 of a mechanism": linked,
     "4": lambda rng: tower(rng, 1),
     "8": lambda rng: tower(rng, 2),
     "16": lambda rng: tower(rng, 4),

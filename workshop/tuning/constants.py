@@ -14,7 +14,8 @@ other pages have larger numbers):
     no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
     jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
     crowded     the FILEs of the families to choose on that come to this stage: most bodies move
-    batches     boxes of 1 to 64 contacts, in batches, cold and warm, to four tolerances
+    batches     boxes of 4 to 64 contacts, in batches, cold and warm, to four tolerances
+    alone       boxes on a corner, mechanisms and spheres, one contact each, likewise
 
 A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
 times; of digits the least of three runs, of batches of more. A FILE or a packing has a limit of
@@ -144,10 +145,11 @@ CONSTANTS = [
             ("most_projections", "sweep_rule"),
             ("few_newton_steps", "sweep_rule"),
             ("near_end", "sweep_rule"),
-            ("part_of_sweep", "lanes"),
-            ("most_steps_alone", "lanes"),
         )
     ),
+    varied("part_of_sweep", "batches", 0.15, 0.6, 1, source="embed/lanes.cpp"),
+    varied("most_steps_alone", "alone", 2, 16, 64, 128, source="embed/alone_steps.hpp"),
+    varied("first_look", "alone", 2, 4, 16, 32, source="embed/alone_steps.hpp"),
 ]
 
 
@@ -184,7 +186,10 @@ PACKINGS = [  # contacts, push, seed
 ]
 
 # how many of each kind take about as long
-BATCHES = {"1": 8000, "4": 1200, "8": 200, "16": 50, "64": 6}
+BATCHES = {
+    "batches": {"4": 1200, "8": 200, "16": 50, "64": 6},
+    "alone": {"1 at a corner": 50000, "1 of a mechanism": 20000, "1": 8000},
+}
 BATCH_SEED = 7  # another one than that of small_problems.py
 BATCH_TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
 BATCH_REPEATS = 7
@@ -257,11 +262,11 @@ def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[s
             yield str(number), problem, None if guess is None else fclib.Solution(r=guess)
 
 
-def measure_batches() -> dict[str, Any]:
+def measure_batches(kind: str) -> dict[str, Any]:
     """The same of batches; CPU times are those of the calls, the least of some."""
     problems = solved = 0
     spent = 0.0
-    for name, count in BATCHES.items():
+    for name, count in BATCHES[kind].items():
         for at_rest in (False, True):
             W, q, mu, _ = small_scenes.problems(name, count, BATCH_SEED, at_rest)
             noise = np.random.default_rng(BATCH_SEED).normal(size=q.shape)
@@ -281,8 +286,8 @@ def measure_batches() -> dict[str, Any]:
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:
     """Solve the problems of a kind: how many, how many solved, CPU time [s], and who came where."""
-    if job["kind"] == "batches":
-        return measure_batches()
+    if job["kind"] in BATCHES:
+        return measure_batches(job["kind"])
     kind, chain, seconds = job["kind"], job["chain"], job["seconds"]
     options: dict[str, Any] = {"chain": chain} if chain else {}
     tol = planted_judge.TOLERANCE
@@ -325,6 +330,17 @@ def command_of(source: str) -> str:
     return str(command)
 
 
+def users_of(header: str) -> list[str]:
+    """The sources of core/ that include the header themselves."""
+    core = ROOT / "core"
+    line = f'#include "{header}"'
+    return [
+        str(file.relative_to(core))
+        for file in sorted(core.rglob("*.cpp"))
+        if line in file.read_text(encoding="utf-8")
+    ]
+
+
 def build(constant: Constant, value: str, folder: Path) -> None:
     """The package with another value of the constant: links to all of it, and its own module."""
     package = folder / "fclib"
@@ -336,20 +352,30 @@ def build(constant: Constant, value: str, folder: Path) -> None:
     changed, times = re.subn(pattern(constant.name), rf"\g<1>{value};", text)
     if times != 1:
         raise SystemExit(f"{constant.name} stands {times} times in core/{constant.source}")
-    source, made = folder / "changed.cpp", folder / "changed.o"
-    source.write_text(changed, encoding="utf-8")
-    words = shlex.split(command_of(constant.source))
-    words[words.index("-o") + 1] = str(made)
-    words[-1] = str(source)
-    subprocess.run(words, cwd=BUILD, check=True)
+    header = constant.source.endswith(".hpp")
+    given = folder / "headers" / constant.source if header else folder / "changed.cpp"
+    given.parent.mkdir(parents=True, exist_ok=True)
+    given.write_text(changed, encoding="utf-8")
+    objects: list[str] = []
+    for source in users_of(constant.source) if header else [constant.source]:
+        made = folder / f"changed{len(objects)}.o"
+        words = shlex.split(command_of(source))
+        words[words.index("-o") + 1] = str(made)
+        first = next(k for k, word in enumerate(words) if word.startswith("-I"))
+        words.insert(first, f"-I{folder / 'headers'}")
+        if not header:
+            words[-1] = str(given)
+        subprocess.run(words, cwd=BUILD, check=True)
+        objects.append(str(made))
     told = subprocess.run(
         ["ninja", "-C", str(BUILD), "-t", "commands", MODULE], capture_output=True, text=True
     )
     link = told.stdout.splitlines()[-1].removeprefix(": && ").removesuffix(" && :")
     words = shlex.split(link)
     words[words.index("-o") + 1] = str(package / MODULE)
-    # what comes before the archive is taken instead of its own object
-    words.insert(words.index("libfclib_core.a"), str(made))
+    # what comes before the archive is taken instead of its own objects
+    at = words.index("libfclib_core.a")
+    words[at:at] = objects
     subprocess.run(words, cwd=BUILD, check=True)
 
 
@@ -451,6 +477,11 @@ def row(
 def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
     """What a reader of the table must know."""
     count, seconds = arguments.count, f"{arguments.seconds:g} s"
+    like_batches = (
+        "thrown and at rest, cold and warm, to "
+        f"{', '.join(map(_results.power, BATCH_TOLERANCES))}; CPU times are those of the calls, "
+        f"the least of {BATCH_REPEATS}."
+    )
     told = {
         "digits": f"Planted problems: of the numbers 0 to {count - 1}.",
         "random": f"Random ones: of the numbers 0 to {count - 1} that come to these stages.",
@@ -461,9 +492,8 @@ def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
         f"counts as {seconds}. A rule without a number is that of all stages of the "
         "name.",
         "crowded": "Crowded ones: files of the families to choose on that come to these stages.",
-        "batches": "Batches: boxes of 1 to 64 contacts, thrown and at rest, cold and warm, to "
-        f"{', '.join(map(_results.power, BATCH_TOLERANCES))}; CPU times are those of the calls, "
-        f"the least of {BATCH_REPEATS}.",
+        "batches": f"Batches: boxes of 4 to 64 contacts, {like_batches}",
+        "alone": f"Contacts alone: boxes on a corner, mechanisms and spheres, {like_batches}",
     }
     return " ".join(text for kind, text in told.items() if kind in kinds)
 

@@ -682,6 +682,7 @@ void Island<Cone>::run(const OwnUnitsStage& rules) {
   const Outcome outcome = chain::run(own.problem(), before, resources_, settings, r);
   for (const Stage& stage : outcome.stages) own_factorisations_ += stage.factorisations;
   if (outcome.cpu_s) tracker_.add_cpu(*outcome.cpu_s - (cpu_time() - start));
+  if (outcome.status == Status::infeasible) tracker_.refuse();
 }
 
 #define FCLIB_INSTANTIATE(Cone) template class Island<Cone>;

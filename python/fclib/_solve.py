@@ -16,9 +16,11 @@ from fclib import _core, _laws
 from fclib._registry import find_solver, parse_solver
 
 Problem: TypeAlias = _laws.Problem
+KINDS = get_args(Problem)
 
 # the types accepted as a solution or a guess
 Given: TypeAlias = _core.Solution | _core.Result | npt.ArrayLike
+Callback: TypeAlias = Callable[[int, float, float, str], bool | np.bool_ | None]
 MeritKind: TypeAlias = Literal["both", "natural"]
 # the numbers of a Merit: its errors, and how many contacts are open, stick and slide
 ERRORS = (
@@ -44,7 +46,7 @@ def solve(
     max_iterations: int | None = None,
     time_limit: float | None = None,
     guess: Given | None = None,
-    callback: Callable[[int, float, float, str], bool | np.bool_ | None] | None = None,
+    callback: Callback | None = None,
     history: bool = False,
     merit: MeritKind = "both",
     **options: Value,
@@ -78,16 +80,20 @@ def solve(
             bilateral constraints contradict each other by more than ``tol``.
         SolverError: a solver outside of fclib failed.
     """
-    return solve_with(
-        solver,
+    info, values = _chosen(solver, tol, max_iterations, time_limit, merit, options)
+    return _run(
+        problem,
+        info,
+        values,
         tol,
-        max_iterations=max_iterations,
-        time_limit=time_limit,
-        callback=callback,
-        history=history,
-        merit=merit,
-        **options,
-    )(problem, guess)
+        max_iterations,
+        time_limit,
+        guess,
+        callback,
+        history,
+        merit,
+        None,
+    )
 
 
 def solve_with(
@@ -96,7 +102,7 @@ def solve_with(
     *,
     max_iterations: int | None = None,
     time_limit: float | None = None,
-    callback: Callable[[int, float, float, str], bool | np.bool_ | None] | None = None,
+    callback: Callback | None = None,
     history: bool = False,
     merit: MeritKind = "both",
     **options: Value,
@@ -107,41 +113,81 @@ def solve_with(
     reactions, get the reactions at rest that are the nearest to the guess, if these solve the
     problem too.
     """
-    check_limits(tol, time_limit, max_iterations=max_iterations)
+    info, values = _chosen(solver, tol, max_iterations, time_limit, merit, options)
+
+    def run(
+        problem: Problem, guess: Given | None = None, still: float | None = None
+    ) -> _core.Result:
+        return _run(
+            problem,
+            info,
+            values,
+            tol,
+            max_iterations,
+            time_limit,
+            guess,
+            callback,
+            history,
+            merit,
+            still,
+        )
+
+    return run
+
+
+def _chosen(
+    solver: str,
+    tol: float,
+    max_iterations: int | None,
+    time_limit: float | None,
+    merit: str,
+    options: dict[str, Value],
+) -> tuple[_core.SolverInfo, dict[str, bool | int | float | str]]:
+    """The solver and its options, once all limits are checked."""
+    usual = max_iterations is None and time_limit is None and type(tol) is float
+    if not (usual and 0 <= tol < math.inf):
+        check_limits(tol, time_limit, max_iterations=max_iterations)
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
     if isinstance(solver, str) and " " in solver:
         solver, own = parse_solver(solver)
         options = {**own, **options}
     values = {name: _plain(name, value) for name, value in options.items()} if options else {}
-    info = find_solver(solver)
-    iterations = max_iterations or 0
-    seconds = math.inf if time_limit is None else time_limit
+    return find_solver(solver), values
 
-    def run(
-        problem: Problem, guess: Given | None = None, still: float | None = None
-    ) -> _core.Result:
-        try:
-            return _core.solve(
-                problem,
-                info,
-                tol,
-                iterations,
-                seconds,
-                values,
-                guess,
-                callback,
-                history,
-                merit == "natural",
-                None,
-                still,
-            )
-        except TypeError:
-            limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
-            name_wrong_type(problem=problem, **limits, history=history, callback=callback)
-            raise  # the callback raised it
 
-    return run
+def _run(
+    problem: Problem,
+    info: _core.SolverInfo,
+    values: dict[str, bool | int | float | str],
+    tol: float,
+    max_iterations: int | None,
+    time_limit: float | None,
+    guess: Given | None,
+    callback: Callback | None,
+    history: bool,
+    merit: str,
+    still: float | None,
+) -> _core.Result:
+    try:
+        return _core.solve(
+            problem,
+            info,
+            tol,
+            max_iterations or 0,
+            math.inf if time_limit is None else time_limit,
+            values,
+            guess,
+            callback,
+            history,
+            merit == "natural",
+            None,
+            still,
+        )
+    except TypeError:
+        limits = {"tol": tol, "max_iterations": max_iterations, "time_limit": time_limit}
+        name_wrong_type(problem=problem, **limits, history=history, callback=callback)
+        raise  # the callback raised it
 
 
 def check_limits(
@@ -180,8 +226,8 @@ def name_wrong_type(**given: object) -> None:
 
 def check_problem(problem: object) -> None:
     """ProblemError if it is none."""
-    if not isinstance(problem, get_args(Problem)):
-        known = ", ".join(kind.__name__ for kind in get_args(Problem))
+    if not isinstance(problem, KINDS):
+        known = ", ".join(kind.__name__ for kind in KINDS)
         raise _core.ProblemError(f"problem: a {type(problem).__name__} is none of {known}")
 
 

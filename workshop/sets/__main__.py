@@ -61,14 +61,14 @@ def find_candidates(
         with many_bars() as bars:
             _, failed = difficulty.describe(folder, own, bars)
         rows = difficulty.measured(folder)
-        count, lost = difficulty.write_problems(folder, rows, select.Rule())
+        count, unwritten = difficulty.write_problems(folder, rows, select.Rule())
     except difficulty.FAULTS as error:
         fail(str(error))
     words = f"{count} of {len(rows)} candidates are measured:  {folder / 'problems'}"
     out.print(words, highlight=False)
     for name, reason in failed.items():
         err.print(f"{name}: has no candidates: {reason}", style="red", highlight=False)
-    tell_lost(lost)
+    tell_lost(unwritten)
     if results:
         costs = difficulty.known_costs(folder)
         table = [{"family": name, "CPU [s]": f"{costs[name]:.1f}"} for name in sorted(own)]
@@ -78,7 +78,7 @@ def find_candidates(
             title="What the candidates of the sets cost",
             note="Simulation of families without stored states, and features.",
         )
-    raise typer.Exit(int(bool(failed or lost)))
+    raise typer.Exit(int(bool(failed or unwritten)))
 
 
 def tell_lost(lost: Mapping[str, str]) -> None:

@@ -259,6 +259,14 @@ def costs_of(row: Row, limit: float) -> dict[str, float]:
     }
 
 
+def machines_of(path: Path) -> list[str]:
+    """The names of the machines that the runs of a store were made on."""
+    from fclib.bench import Store
+
+    with Store(path, create=False) as store:
+        return sorted({str(run["node"]) for run in store.results(start="cold")})
+
+
 def measured(
     rows: Sequence[Row],
     stores: Mapping[float, Path],
@@ -267,7 +275,8 @@ def measured(
     """Rows with the costs of all solvers, and the least error known, from stores.
 
     A solver has solved a problem only if it also solves the renumbered copy, and its cost is the
-    larger of both: of two, the median of `fclib.bench.comparison` would be the luckier one.
+    larger of both: of two, the median of `fclib.bench.comparison` would be the luckier one. Runs on
+    several machines each have the times of their own: hardly any limit is so near that it matters.
 
     Args:
         rows: of the candidates.
@@ -282,8 +291,8 @@ def measured(
     costs: dict[str, dict[str, float]] = defaultdict(dict)
     best: dict[str, tuple[float, str]] = {}
     names: dict[str, None] = {}
-    for limit, path in stores.items():
-        runs = profiles.load(path, tolerances=[TOLERANCE], merit="both")
+    for limit, path, machine in [(k, v, m) for k, v in stores.items() for m in machines_of(v)]:
+        runs = profiles.load(path, tolerances=[TOLERANCE], merit="both", machine=machine)
         runs = runs.where(comparison.numbers_in(runs, "time_limit") == limit)
         copies = comparison.numbers_in(runs, "copy", 0.0)
         for copy in np.unique(copies):

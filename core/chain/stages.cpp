@@ -182,6 +182,7 @@ bool Island<Cone>::applies(const StageRule& rule) const {
   if ((when.law == Law::coulomb || coulomb_alone(rule.method)) && !coulomb) return false;
   if (when.law == Law::rolling && coulomb) return false;
   if (when.jointed > 0 && !(jointed() > when.jointed)) return false;
+  if (when.range > 0 && !(range_of_units(problem_) > when.range)) return false;
   return when.bodies == Bodies::any ||
          (when.bodies == Bodies::fewer) == CoupledSystem::bodies_are_fewer(problem_);
 }
@@ -657,7 +658,6 @@ void Island<Cone>::run(const AssociatedStage& /*rules*/) {
 
 template <class Cone>
 void Island<Cone>::run(const OwnUnitsStage& rules) {
-  if (!(range_of_units(problem_) > rules.range)) return;
   const InOwnUnits own(problem_);
   Table before;
   for (const StageRule& rule : table_) {

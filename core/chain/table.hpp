@@ -50,6 +50,7 @@ struct When {
   double below = 0;
   bool guessed = false;
   double jointed = 0;
+  double range = 0;
   Bodies bodies = Bodies::any;
   Law law = Law::any;
 
@@ -68,6 +69,9 @@ struct When {
         option("jointed", &O::jointed, "1", {0, 1},
                "The stage runs only if bilateral constraints take more than this share of the "
                "mobility of some contact. 0: always."),
+        option("range", &O::range, "1", {0},
+               "The stage runs only if the largest trace of a diagonal block of W is more than so "
+               "many times the least one. 0: always."),
         choice("bodies", &O::bodies, bodies_names,
                "fewer: the bodies have at most half as many coordinates as the contacts. more: "
                "they have more."),
@@ -366,17 +370,9 @@ struct OwnUnitsStage {
   static constexpr std::string_view families = "chain";
   static constexpr std::string_view doc =
       "The stages of the table before this one, on the problem in the units of its contacts.";
-  double range = 1e6;
   Start from = Start::nothing;
 
-  static constexpr auto fields() {
-    using O = OwnUnitsStage;
-    return std::tuple{
-        option("range", &O::range, "1", {1},
-               "The stage runs only if the largest trace of a diagonal block of W is more than so "
-               "many times the least one."),
-        start_from(&O::from)};
-  }
+  static constexpr auto fields() { return std::tuple{start_from(&OwnUnitsStage::from)}; }
 };
 
 using Method = std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage,

@@ -49,7 +49,7 @@ interior point, smoothed        : interior_point      law=coulomb from=swept    
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
 # light bodies beside heavy ones, angles beside lengths: a hand whose fingers stand at their limits
 # (talos_full_v2 of example-robot-data, steps 0, 4, 5, 10, 16)
-own units                       : own_units                                            range=1e6
+own units                       : own_units           range=1e6
 # if most bodies rest: reactions that hold them are found by convex problems, with all that creep
 held bodies                     : held_bodies         at_least=100                     creep=0
 # 100786, 101711

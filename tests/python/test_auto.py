@@ -554,7 +554,7 @@ def test_a_problem_in_its_own_units_is_the_same_problem(law: str) -> None:
     assert result.iterations <= 1.1 * whole.iterations + 10
     assert result.history is not None
     assert result.history[-1][1] == pytest.approx(result.error, rel=1e-3, abs=1e-12)
-    assert fclib.solve(problem, chain=chain + "1e30").status == "stalled"
+    assert stage_names(fclib.solve(problem, chain=chain + "1e30")) == ["sweeps"]
     # nothing comes before it, so it does nothing
     assert fclib.solve(problem, chain="own : own_units range=1").status == "stalled"
 

@@ -378,6 +378,8 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
   Vector direction = z;
   double rz = residual.dot(z);
   double last = residual.norm();
+  std::int64_t told = 0;  // iterations that are counted
+  const auto untold = [&](std::int64_t k) { return k - std::exchange(told, k); };
   for (std::int64_t k = 1; k <= limit; ++k) {
     problem_.W.multiply_add(direction, zero, product);
     const double curvature = direction.dot(product);
@@ -394,7 +396,7 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
       if (violation(r) > most_outside || !(rate > 0) || left > static_cast<double>(limit)) {
         return;
       }
-      if (tracker_.report(trial, error_, best_)) return;
+      if (tracker_.report(untold(k), error_, best_)) return;
       last = size;
     }
     if (size <= tolerance_ * problem_.scale) {
@@ -402,7 +404,7 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
       project(inside);
       Vector u(problem_.m());
       problem_.velocity(inside, u);
-      if (take(k % trial, relative_error<Cone>(problem_, u, inside), inside)) return;
+      if (take(untold(k), relative_error<Cone>(problem_, u, inside), inside)) return;
       // the rest of the error is that r is not in the cones
       if (size <= exact_residual * tolerance_ * problem_.scale) return;
     }
@@ -411,7 +413,7 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
     direction = z + (next / rz) * direction;
     rz = next;
   }
-  if (limit < rules.limit) tracker_.report(limit % trial, error_, best_);
+  if (limit < rules.limit) tracker_.report(untold(limit), error_, best_);
 }
 
 template <class Cone>

@@ -120,7 +120,7 @@ FCLIB_IN_LANES void solve_lanes_alone(double tolerance, int start, int count,
     // as BoundedError has it; as an impulse the map is no more than as a velocity
     const Wide rounding = unit * (error + (mu + 1) * (terms + lengths * over_rho) * over_scale);
     const Wide bound = error + rounding;
-    const unsigned solved = left & at_most(rounding, Wide::Constant(bounded_excess * tolerance)) &
+    const unsigned solved = left & at_most(rounding, Wide::Constant(bounded_rounding * tolerance)) &
                             at_most(bound, Wide::Constant(tolerance));
     left &= ~solved;
     if (steps >= first_look / 2 && (steps & (steps - 1)) == 0) {

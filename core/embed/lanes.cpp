@@ -292,7 +292,7 @@ bool Lanes<D>::judge(const Lane& lane, const double* r, double* u, double& error
                                                   (speed / lane.least + size) / lane.scaled_scale));
   bound = error + rounding;
   if (!std::isfinite(lengths)) error = std::numeric_limits<double>::infinity();
-  return rounding <= bounded_excess * tolerance_;
+  return rounding <= bounded_rounding * tolerance_;
 }
 
 template class Lanes<2>;

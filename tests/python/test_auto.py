@@ -559,6 +559,18 @@ def test_a_problem_in_its_own_units_is_the_same_problem(law: str) -> None:
     assert fclib.solve(problem, chain="own : own_units range=1").status == "stalled"
 
 
+def test_conjugate_gradients_count_each_iteration_once() -> None:
+    rng = np.random.default_rng(69)
+    A = rng.normal(size=(6, 6))
+    problem = fclib.LocalProblem(W=A @ A.T, q=rng.normal(size=6), mu=[0.3, 0.3])
+    chain = "a : conjugate_gradients at_least=1 limit=50"
+    for most in range(1, 8):
+        result = fclib.solve(problem, tol=0.1, chain=chain, max_iterations=most, history=True)
+        assert result.iterations <= most
+        assert result.history is not None
+        assert [row[0] for row in result.history][-1] <= most
+
+
 def test_limits_hold_in_own_units() -> None:
     problem = bodies(4, 20, mu=0.5, hyperstatic=True)
     chain = "sweeps : gauss_seidel limit=4 worth=0; own : own_units range=1.01"

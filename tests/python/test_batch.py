@@ -527,3 +527,19 @@ def test_from_c(tmp_path: Path) -> None:
     program = compile_program(ROOT / "tests/capi/batch.c", tmp_path / "batch", "-lm")
     done = subprocess.run([program], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
+
+
+def test_an_error_is_at_most_a_thousandth_of_the_tolerance_too_large() -> None:
+    # what is found in double precision is too large by nearly the whole of its rounding
+    W = [
+        [1.014400297094653e-08, 1.8240771115785037e-09, -1.7190695533741973e-09],
+        [1.8240771115785037e-09, 2.6563260480116924e-09, -8.278593366384257e-10],
+        [-1.7190695533741973e-09, -8.278593366384257e-10, 3.355046240827164e-09],
+    ]
+    q = [-4.491317272186279, -0.3939448297023773, 0.7381702065467834]
+    mu = [0.035024166107177734]
+    problem = fclib.LocalProblem(W=np.array(W), q=np.array(q), mu=mu)
+    for tol in (1e-3, 1e-6):
+        found = fclib.solve_batch(np.array([W]), np.array([q]), np.array([mu]), tol=tol)
+        error = fclib.merit(problem, fclib.Solution(r=found.r[0])).error
+        assert error <= found.error[0] <= error + 1e-3 * tol

@@ -8,7 +8,8 @@ namespace fclib {
 
 /// A bound on the error is at most this part of the tolerance above the error.
 constexpr double bounded_excess = 1e-3;
-/// So the rounding is at most this part: what is found may be so much too large, and it is added.
+/// So the rounding in lanes is at most this part: what is found may be so much too large, and it is
+/// added.
 constexpr double bounded_rounding = bounded_excess / 2;
 /// Roundings of the natural map of one contact, generously.
 constexpr double roundings_of_the_map = 40;

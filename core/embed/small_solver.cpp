@@ -141,7 +141,7 @@ class BoundedError {
                              double scaled_scale) const {
     const double rounding =
         unit_ * error + larger_error(plain_ / scale, velocities_ / scale, impulses_ / scaled_scale);
-    if (!(rounding <= bounded_rounding * tolerance)) return std::numeric_limits<double>::infinity();
+    if (!(rounding <= bounded_excess * tolerance)) return std::numeric_limits<double>::infinity();
     return error + rounding;
   }
 

@@ -690,6 +690,17 @@ def test_two_versions_of_a_solver_are_two_solvers(store: Path) -> None:
     }
 
 
+def test_a_version_is_told_only_where_it_tells_runs_apart(store: Path) -> None:
+    fill(store, {"A": [1.0]}, version="2.0")  # of the first problem alone
+    others = profiles.load(store, digests={"hash1", "hash2", "hash3"})
+    assert {row["solver"] for row in others} == {"A", "B", "C"}
+    assert {row["hash"] for row in others} == {"hash1", "hash2", "hash3"}
+    first = profiles.load(store, digests={"hash0"})
+    assert {row["solver"] for row in first} == {"A (1.0)", "A (2.0)", "B", "C"}
+    with pytest.raises(profiles.ProfileError, match="no runs of these problems"):
+        profiles.load(store, digests={"another"})
+
+
 def test_what_campaigns_quote_is_found_by_family_and_tolerance(tmp_path: Path) -> None:
     text = """
     tolerances = [1e-3]

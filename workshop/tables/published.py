@@ -154,10 +154,10 @@ def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[res
 
 def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
     """The runs of a set, gathered; None if there is none."""
-    rows = profiles.load(joined.path)
+    # only their problems, so that a solver has no version in its name if others had another one
+    own = {choice.digest for choice in set_index.choices(name)} if name in LISTS else set()
+    rows = profiles.load(joined.path, digests=own)
     if name in LISTS:
-        own = {choice.digest for choice in set_index.choices(name)}
-        rows = rows.where(words_in(rows, "hash").is_in(own))
         # at one limit, that of most runs
         limits, counts = np.unique(numbers_in(rows, "time_limit"), return_counts=True)
         if limits.size:

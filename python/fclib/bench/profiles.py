@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -120,6 +120,7 @@ def load(
     merit: MeritKind | None = None,
     start: Start | None = "cold",
     more: Sequence[str] = (),
+    digests: Collection[str] = (),
 ) -> Table:
     """The runs of a store for a profile.
 
@@ -136,6 +137,7 @@ def load(
             without the first steps, which had no step before them. None: both, which no profile
             takes.
         more: further columns of long texts, for example "message".
+        digests: only problems with these data.
 
     Raises:
         StoreError: the file is not a store.
@@ -148,6 +150,11 @@ def load(
     later = numbers_in(runs, "step", 0.0) > 0
     runs = kept(runs, words_in(runs, "start").is_in(["cold"]) | later)
     runs = _name_machines(runs)
+    if digests:
+        own = words_in(runs, "hash").is_in(digests)
+        if not own.any():
+            raise ProfileError(f"{store}: there are no runs of these problems")
+        runs = kept(runs, own)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
         ("set", sets),

@@ -24,6 +24,7 @@ def add_run(
     repeat: int = 0,
     limit: float = 10.0,
     error: float = 1.0,
+    node: str = "here",
     **job: Any,
 ) -> None:
     """A run; without a time it has failed, with this error."""
@@ -34,7 +35,7 @@ def add_run(
         total_cpu_s=seconds,
         wall_s=seconds,
         merits={"error": tol / 2 if status == "converged" else error},
-        machine={"node": "here"},
+        machine={"node": node},
     )
     limits = Limits(limit, limit, 1000)
     with Store(store) as opened:

@@ -403,6 +403,17 @@ def test_what_was_accepted_closes_a_problem() -> None:
     assert [row["best_error"] for row in found] == [1e-12, None, None]
 
 
+def test_runs_of_several_machines_are_taken(tmp_path: Path) -> None:
+    rows = [candidate(f"a/A/{k:04d}") for k in range(2)]
+    store = tmp_path / "short.sqlite"
+    add(store, rows[0], "nsgs", 1.0)
+    add(store, rows[1], "nsgs", 2.0, node="there")
+    add(store, rows[1], "apgd", None, node="there")
+    found = select.measured(rows, {10.0: store})
+    assert select.costs_of(found[0], 10.0) == {"nsgs": 1.0}
+    assert select.costs_of(found[1], 10.0) == {"nsgs": 2.0, "apgd": math.inf}
+
+
 def test_campaigns_measure_what_the_rule_reads() -> None:
     for limit, (name, folder) in difficulty.CAMPAIGNS.items():
         campaign = Campaign.read(name)

@@ -147,6 +147,7 @@ CONSTANTS = [
             ("near_end", "sweep_rule"),
         )
     ),
+    varied("own_tolerance", "random", 1, 1e-3, 1e-4, source="chain/stages.cpp"),
     varied("part_of_sweep", "batches", 0.15, 0.6, 1, source="embed/lanes.cpp"),
     varied("most_steps_alone", "alone", 2, 16, 64, 128, source="embed/alone_steps.hpp"),
     varied("first_look", "alone", 2, 4, 16, 32, source="embed/alone_steps.hpp"),

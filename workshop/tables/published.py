@@ -33,6 +33,7 @@ from fclib._verdicts import is_solved
 from fclib.bench import comparison, plots, profiles
 from fclib.bench.calibration import calibration_in
 from fclib.bench.comparison import Array, Costs, numbers_in, odds, words_in
+from fclib.bench.store import Store
 from fclib.bench.table import Table
 from fclib.collections import set_index
 from workshop.tables import _results
@@ -155,15 +156,18 @@ def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[res
 def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
     """The runs of a set, gathered; None if there is none."""
     # only their problems, so that a solver has no version in its name if others had another one
-    own = {choice.digest for choice in set_index.choices(name)} if name in LISTS else set()
+    own = {choice.digest for choice in set_index.choices(name)} if name in LISTS else None
+    if own is not None:
+        with Store(joined.path, create=False) as opened:
+            own &= set(words_in(opened.table(), "hash").present())
+        if not own:
+            return None
     rows = profiles.load(joined.path, digests=own)
     if name in LISTS:
         # at one limit, that of most runs
         limits, counts = np.unique(numbers_in(rows, "time_limit"), return_counts=True)
         if limits.size:
             rows = rows.where(numbers_in(rows, "time_limit") == limits[counts.argmax()])
-    if not len(rows):
-        return None
     every = profiles.gather(rows)
     return Set(name, shards, rows, every, comparison.compared(every), str(joined))
 

@@ -120,7 +120,7 @@ def load(
     merit: MeritKind | None = None,
     start: Start | None = "cold",
     more: Sequence[str] = (),
-    digests: Collection[str] = (),
+    digests: Collection[str] | None = None,
 ) -> Table:
     """The runs of a store for a profile.
 
@@ -137,7 +137,7 @@ def load(
             without the first steps, which had no step before them. None: both, which no profile
             takes.
         more: further columns of long texts, for example "message".
-        digests: only problems with these data.
+        digests: only problems with these data. None: all.
 
     Raises:
         StoreError: the file is not a store.
@@ -150,7 +150,7 @@ def load(
     later = numbers_in(runs, "step", 0.0) > 0
     runs = kept(runs, words_in(runs, "start").is_in(["cold"]) | later)
     runs = _name_machines(runs)
-    if digests:
+    if digests is not None:
         own = words_in(runs, "hash").is_in(digests)
         if not own.any():
             raise ProfileError(f"{store}: there are no runs of these problems")

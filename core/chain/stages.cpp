@@ -85,8 +85,12 @@ double sweep_cost(const ReducedProblem& problem) {
   return sweep_operations * static_cast<double>(problem.nc()) +
          static_cast<double>(problem.W.entries());
 }
+/// Of an iteration without its factorisation: what one costs at least, and no system is analysed.
+double least_factorisation_cost(const ReducedProblem& problem) {
+  return iteration_operations * static_cast<double>(problem.nc());
+}
 double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& system) {
-  return iteration_operations * static_cast<double>(problem.nc()) + system.flops();
+  return least_factorisation_cost(problem) + system.flops();
 }
 
 /// Random numbers, the same on every machine.
@@ -266,6 +270,12 @@ CoupledSystem& Island<Cone>::system() {
 }
 
 template <class Cone>
+bool Island<Cone>::pays(double operations, double factorisations) {
+  return operations <= factorisations * least_factorisation_cost(problem_) ||
+         operations <= factorisations * factorisation_cost(problem_, system());
+}
+
+template <class Cone>
 void Island<Cone>::run(const GaussSeidelStage& rules) {
   const std::int64_t interval = sweeps_per_look;
   std::int64_t limit = rules.limit;
@@ -290,10 +300,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
     if (rules.worth > 0 && k >= 2 * interval && k >= limit / 4) {
       const double rate = std::log(last / error) / static_cast<double>(count);
       const double left = std::log(error / tolerance_) / rate;
-      if (!(rate > 0) ||
-          left * sweep_cost(problem_) > rules.worth * factorisation_cost(problem_, system())) {
-        return;
-      }
+      if (!(rate > 0) || !pays(left * sweep_cost(problem_), rules.worth)) return;
       if (k == limit && left < extension * static_cast<double>(limit)) limit += interval;
     }
     last = error;

@@ -49,13 +49,6 @@ void solve_alone_anywhere(double tolerance, int count, const LocalArrays& first,
   solve_all_alone<D, Wide>(tolerance, count, first, found);
 }
 
-#ifdef FCLIB_AVX2
-bool has_avx2() {
-  static const bool has = __builtin_cpu_supports("avx2") != 0;
-  return has;
-}
-#endif
-
 template <int D>
 void solve_alone(double tolerance, int count, const LocalArrays& first, Alone& found) {
 #ifdef FCLIB_AVX2

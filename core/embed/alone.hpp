@@ -8,11 +8,7 @@
 #include <type_traits>
 
 #include "embed/local_arrays.hpp"
-
-// as for any compiler that knows its attributes, on the processors that may have AVX2
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__EMSCRIPTEN__)
-#define FCLIB_AVX2
-#endif
+#include "linalg/processor.hpp"
 
 namespace fclib {
 
@@ -40,8 +36,6 @@ void solve_alone_avx2(std::integral_constant<int, 2> dimension, double tolerance
                       const LocalArrays& first, Alone& found);
 void solve_alone_avx2(std::integral_constant<int, 3> dimension, double tolerance, int count,
                       const LocalArrays& first, Alone& found);
-/// Whether this processor has it.
-bool has_avx2();
 #endif
 
 }  // namespace fclib

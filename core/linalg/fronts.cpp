@@ -276,7 +276,12 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
       where[up.nodes[k]] = d * static_cast<Index>(k);
     Front& front = fronts[f];
     for (auto k = static_cast<std::size_t>(pivots[f]); k < front.nodes.size(); ++k) {
-      front.to_parent.push_back(where[front.nodes[k]]);
+      const Index to = where[front.nodes[k]];
+      front.to_parent.push_back(to);
+      if (front.runs.empty() || front.runs.back().to + front.runs.back().count != to) {
+        front.runs.push_back({to, 0});
+      }
+      front.runs.back().count += d;
     }
   }
   for (std::size_t f = 0; f < fronts.size(); ++f) {

@@ -33,12 +33,16 @@ struct Front {
     std::int64_t block;
     Index row, col;  // scalar offsets
   };
+  struct Run {  // neighbouring rows of the update that are neighbours in the parent's front
+    Index to, count;  // scalar
+  };
   Index pivots = 0;          // scalar
   Index size = 0;            // scalar: the pivots and the rows that they update
   std::vector<Index> nodes;  // pivot nodes first (new numbering)
   std::vector<Entry> entries;
   std::vector<Index> children;
   std::vector<Index> to_parent;  // scalar offset in the parent's front of each update block
+  std::vector<Run> runs;         // the same, for the rows
 };
 
 enum class Ordering { best, minimum_degree, nested_dissection };

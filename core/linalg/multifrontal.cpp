@@ -21,6 +21,12 @@ constexpr double moved = 10;
 /// At most so many fronts for each thread are above the subtrees.
 constexpr std::size_t cuts = 16;
 
+/// A matrix or a part of one. The kernels do not write to what is only read.
+template <class Matrix>
+DenseView view(const Matrix& a) {
+  return {const_cast<double*>(a.data()), a.rows(), a.cols(), a.outerStride()};
+}
+
 }  // namespace
 
 Multifrontal::Multifrontal(const BlockPattern& pattern, int threads)
@@ -146,34 +152,14 @@ bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exc
   for (Index start = 0; start < n; start += panel) {
     const Index width = std::min(panel, n - start);
     const Index end = start + width;
-    for (Index k = start; k < end; ++k) {
-      Index best = k;
-      double largest = 0;
-      for (Index row = k; row < n; ++row) {
-        const double value = std::abs(a(row, k));
-        if (value > largest) {
-          largest = value;
-          best = row;
-        }
-      }
-      if (!(largest < std::numeric_limits<double>::infinity())) return false;
-      exchanged[static_cast<std::size_t>(k)] = best;
-      if (best != k) a.row(k).swap(a.row(best));
-      if (largest <= tiny) a(k, k) = a(k, k) < 0 ? -tiny : tiny;
-      const double inverse = 1.0 / a(k, k);
-      for (Index row = k + 1; row < n; ++row) a(row, k) *= inverse;
-      for (Index col = k + 1; col < end; ++col) {
-        const double factor = a(k, col);
-        if (factor == 0) continue;
-        for (Index row = k + 1; row < n; ++row) a(row, col) -= a(row, k) * factor;
-      }
-    }
+    if (!kernels_->eliminate(view(a), start, end, tiny, exchanged.data())) return false;
     if (end == n) break;
     const Index rest = n - end;
     split(rest, rest < few ? 1 : threads, [&](Index first, Index count) {
-      auto right = a.block(start, end + first, width, count);
-      a.block(start, start, width, width).triangularView<Eigen::UnitLower>().solveInPlace(right);
-      a.block(end, end + first, rest, count).noalias() -= a.block(end, start, rest, width) * right;
+      const DenseView right = view(a.block(start, end + first, width, count));
+      kernels_->solve_unit_lower(view(a.block(start, start, width, width)), right);
+      kernels_->subtract_product(view(a.block(end, end + first, rest, count)),
+                                 view(a.block(end, start, rest, width)), right);
     });
   }
   return true;
@@ -219,15 +205,16 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
     }
   }
   for (const Index child : front.children) {
-    const std::vector<Index>& to_parent = symbolic_->fronts[child].to_parent;
+    const Front& below = symbolic_->fronts[child];
     Factors& from = factors_[child];
-    const auto blocks = static_cast<Index>(to_parent.size());
-    for (Index cb = 0; cb < blocks; ++cb) {
+    const double* source = from.update.data();
+    for (const Index to : below.to_parent) {
       for (int c = 0; c < d; ++c) {
-        const double* source = from.update.data() + std::ptrdiff_t{d * cb + c} * d * blocks;
-        double* target = &a(0, to_parent[cb] + c);
-        for (Index rb = 0; rb < blocks; ++rb) {
-          for (int r = 0; r < d; ++r) target[to_parent[rb] + r] += source[d * rb + r];
+        double* target = &a(0, to + c);
+        for (const Front::Run& run : below.runs) {
+          Eigen::Map<Vector>(target + run.to, run.count) +=
+              Eigen::Map<const Vector>(source, run.count);
+          source += run.count;
         }
       }
     }
@@ -244,18 +231,17 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
     if (other != row) factors.upper.row(row).swap(factors.upper.row(other));
   }
   split(u, threads, [&](Index first, Index count) {
-    auto part = factors.upper.middleCols(first, count);
-    factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(part);
+    kernels_->solve_unit_lower(view(factors.diagonal), view(factors.upper.middleCols(first, count)));
   });
   factors.lower = a.bottomLeftCorner(u, k);
   split(u, threads, [&](Index first, Index count) {
-    auto part = factors.lower.middleRows(first, count);
-    factors.diagonal.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(part);
+    kernels_->solve_upper_from_right(view(factors.diagonal),
+                                     view(factors.lower.middleRows(first, count)));
   });
   factors.update = a.bottomRightCorner(u, u);
   split(u, threads, [&](Index first, Index count) {
-    factors.update.middleCols(first, count).noalias() -=
-        factors.lower * factors.upper.middleCols(first, count);
+    kernels_->subtract_product(view(factors.update.middleCols(first, count)), view(factors.lower),
+                               view(factors.upper.middleCols(first, count)));
   });
   return true;
 }
@@ -282,10 +268,10 @@ void Multifrontal::forward(std::size_t f, Vector& local) const {
   }
   local.segment(front.pivots, u).setZero();
   for (const Index child : front.children) {
-    const std::vector<Index>& to_parent = symbolic_->fronts[child].to_parent;
     const double* source = factors_[child].right.data();
-    for (const Index to : to_parent) {
-      for (int c = 0; c < d; ++c) local[to + c] += *source++;
+    for (const Front::Run& run : symbolic_->fronts[child].runs) {
+      local.segment(run.to, run.count) += Eigen::Map<const Vector>(source, run.count);
+      source += run.count;
     }
   }
   auto top = local.head(front.pivots);
@@ -293,13 +279,13 @@ void Multifrontal::forward(std::size_t f, Vector& local) const {
     const Index other = factors.exchanged[static_cast<std::size_t>(k)];
     if (other != k) std::swap(top[k], top[other]);
   }
-  factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(top);
+  kernels_->solve_unit_lower(view(factors.diagonal), view(top));
   for (Index k = 0; k < pivots; ++k) {
     for (int c = 0; c < d; ++c) permuted_[d * front.nodes[k] + c] = local[d * k + c];
   }
   if (u == 0) return;
   factors.right = local.segment(front.pivots, u);
-  factors.right.noalias() -= factors.lower * top;
+  kernels_->subtract_product(view(factors.right), view(factors.lower), view(top));
 }
 
 void Multifrontal::backward(std::size_t f, Vector& local) const {
@@ -312,8 +298,10 @@ void Multifrontal::backward(std::size_t f, Vector& local) const {
       local[d * static_cast<Index>(k) + c] = permuted_[d * front.nodes[k] + c];
   }
   auto top = local.head(front.pivots);
-  if (u > 0) top.noalias() -= factors.upper * local.segment(front.pivots, u);
-  factors.diagonal.triangularView<Eigen::Upper>().solveInPlace(top);
+  if (u > 0) {
+    kernels_->subtract_product(view(top), view(factors.upper), view(local.segment(front.pivots, u)));
+  }
+  kernels_->solve_upper(view(factors.diagonal), view(top));
   for (Index k = 0; k < front.pivots / d; ++k) {
     for (int c = 0; c < d; ++c) permuted_[d * front.nodes[k] + c] = local[d * k + c];
   }

@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "linalg/dense_kernels.hpp"
 #include "linalg/fronts.hpp"
 #include "linalg/workers.hpp"
 
@@ -75,6 +76,7 @@ class Multifrontal {
   template <class F>
   void split(Index n, int threads, const F& f);
 
+  const DenseKernels* kernels_ = &dense_kernels();
   std::shared_ptr<const Fronts> symbolic_ = std::make_shared<Fronts>();
   std::vector<Factors> factors_;
   std::unique_ptr<Workers> workers_;              // if there are several

@@ -513,8 +513,11 @@ Matrix SmallSolver<D>::matrix() const {
   };
   for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
+    std::size_t k = row_[self];
+    // by columns: what is summed in this order has the digits of a dense W
+    for (; k < row_[self + 1] && column_[k] < a; ++k) add(blocks_[k], a, column_[k]);
     add(diagonal_[self], a, a);
-    for (std::size_t k = row_[self]; k < row_[self + 1]; ++k) add(blocks_[k], a, column_[k]);
+    for (; k < row_[self + 1]; ++k) add(blocks_[k], a, column_[k]);
   }
   return result;
 }

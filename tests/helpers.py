@@ -485,3 +485,15 @@ def git(*words: str) -> str:
 def dense(a: Any) -> Array:
     """Any matrix as a dense array."""
     return np.asarray(a.toarray() if sp.issparse(a) else a, dtype=float)
+
+
+# ---- programs
+
+
+def ran(
+    *command: object, code: int | None = 0, **settings: Any
+) -> subprocess.CompletedProcess[str]:
+    """A program that has ended with this code, or with any, and what it said."""
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, **settings)
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done

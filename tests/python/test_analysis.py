@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from helpers import (
     planted_local,
     planted_rolling,
     project,
+    ran,
     real_folder,
     ring,
 )
@@ -887,7 +887,7 @@ def test_importing_fclib_loads_none_of_it() -> None:
     code = (
         "import sys, fclib; print([m for m in ('clarabel', 'fclib.analysis') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = ran(sys.executable, "-c", code)
     assert done.stdout.strip() == "[]"
 
 

@@ -1,6 +1,5 @@
 """What `import fclib` gives: light, complete, typed."""
 
-import subprocess
 import sys
 import types
 from importlib.metadata import version
@@ -11,14 +10,14 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import dense
+from helpers import dense, ran
 
 HEAVY = ("scipy", "mujoco", "typer", "rich", "matplotlib", "h5py", "dask", "plotly")
 
 
 def loaded_after(code: str) -> set[str]:
     script = f"import sys\n{code}\nprint(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    run = ran(sys.executable, "-c", script)
     names = run.stdout.split()
     return {*names, *(name.partition(".")[0] for name in names)}
 

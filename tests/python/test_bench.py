@@ -28,7 +28,7 @@ from fclib import bench, cli
 from fclib._solve import MERITS
 from fclib.bench import problems
 from fclib.bench.job import Job, Record
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 
 KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
 RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "200"))
@@ -257,8 +257,7 @@ def test_no_run_is_lost_or_doubled_by_kill_9(tmp_path: Path) -> None:
             assert seen.items() <= now.items()
             seen = now
         counts.append(len(seen))
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    ran(*command)
     with bench.Store(path) as store:
         rows = store.results()
         states = store.status()

@@ -22,7 +22,7 @@ import pytest
 import fclib
 import helpers_cli
 from fclib import bench
-from helpers import planted_local
+from helpers import planted_local, ran
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
@@ -333,7 +333,7 @@ def free_port() -> int:
 
 
 def slurm_says(*command: str) -> str:
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    return ran(*command, code=None).stdout.strip()
 
 
 def jobs_of_slurm(state: str = "RUNNING") -> list[str]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import fclib
 from ball_judge import judge
 from fclib import analysis
 from helpers import dense, last_resort, ring
+from helpers_cli import run
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -178,11 +177,11 @@ def test_a_certificate_from_a_file(tmp_path: Path) -> None:
     good.write_text(json.dumps(proof.record(problem)))
     wrong = tmp_path / "wrong.json"
     wrong.write_text(json.dumps({"y": {"0": 1, "1": 1}}))
-    command = [sys.executable, "-m", "fclib", "check", str(tmp_path / "ring.hdf5"), "--json"]
-    done = subprocess.run([*command, "--certificate", str(good)], capture_output=True, text=True)
+    command = ("check", tmp_path / "ring.hdf5", "--json", "--certificate")
+    done = run(*command, good)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["exact"] is True
-    done = subprocess.run([*command, "--certificate", str(wrong)], capture_output=True, text=True)
+    done = run(*command, wrong)
     assert done.returncode == 1
     assert "contact 0" in json.loads(done.stdout)["message"]
 
@@ -199,11 +198,8 @@ def test_missing_data_are_no_proof(path: Path) -> None:
     with pytest.raises(fclib.Error, match=re.escape(f"{path}: {words}")):
         fclib.read(path)
     for command in ("info", "check", "solve", "analyze"):
-        done = subprocess.run(
-            [sys.executable, "-m", "fclib", command, str(path)], capture_output=True, text=True
-        )
-        assert done.returncode == 1
-        assert done.stdout == ""
+        done = run(command, path)
+        assert (done.returncode, done.stdout) == (1, "")
         assert words in done.stderr
 
 

@@ -23,7 +23,7 @@ import fclib
 from ball_judge import judge
 from fclib import cli
 from fclib.cli._output import Rows
-from helpers import dense, planted_global, planted_local
+from helpers import dense, planted_global, planted_local, ran
 from helpers_cli import run
 
 SOLVE_KEYS = [
@@ -49,7 +49,7 @@ def start(
     script = Path(sys.executable).with_name("fclib")
     program = [sys.executable, "-m", "fclib"] if module else [str(script)]
     command = [*program, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=env)
+    return ran(*command, code=None, env=env)
 
 
 def records(result: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
@@ -445,9 +445,7 @@ def test_a_command_imports_what_it_needs_alone(files: list[Path]) -> None:
         (["--help"], ["scipy.linalg", "mujoco", "pyarrow", "matplotlib", "fclib.analysis"]),
         (["bench", "--help"], ["scipy", "mujoco", "pyarrow", "fclib.analysis"]),
     ):
-        done = subprocess.run(
-            [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
-        )
+        done = ran(sys.executable, "-c", code, *arguments)
         loaded = done.stderr.split()
         assert "fclib.cli" in loaded
         assert not set(absent) & set(loaded)
@@ -823,14 +821,8 @@ def test_an_infinite_tolerance_is_refused(files: list[Path]) -> None:
 def test_a_name_that_the_output_cannot_encode_is_no_error(tmp_path: Path) -> None:
     problem = fclib.LocalProblem(W=np.eye(3), q=-np.ones(3), mu=np.full(1, 0.5))
     fclib.write(tmp_path / "caf\u00e9.hdf5", problem)
-    shown = subprocess.run(
-        [sys.executable, "-m", "fclib", "info", "caf\u00e9.hdf5"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONIOENCODING": "ascii"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    command = (sys.executable, "-m", "fclib", "info", "caf\u00e9.hdf5")
+    shown = ran(*command, cwd=tmp_path, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert "caf\\xe9.hdf5" in shown.stdout
     assert not shown.stderr
 

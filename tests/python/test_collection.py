@@ -45,7 +45,7 @@ from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
 from fclib.collections.set_index import DATA
 from fclib.simulate import control_of
-from helpers_cli import invoke
+from helpers_cli import invoke, run
 from workshop.sets import metadata
 
 FAMILIES = collections.families()
@@ -1330,14 +1330,8 @@ def test_build_needs_names(tmp_path: Path, arguments: tuple[str, ...]) -> None:
 
 def test_unwritable_folder_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    command = [sys.executable, "-m", "fclib", "collection", "build", "Chain", "--count", "1"]
-    done = subprocess.run(
-        [*command, "--out", str(tmp_path / "file" / "below")],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    words = ("collection", "build", "Chain", "--count", 1, "--out", tmp_path / "file" / "below")
+    done = run(*words)
     assert done.returncode == 1
     *said, error = done.stderr.splitlines()
     assert "below" in error

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import fclib
 import helpers_cli
 from ball_judge import judge
-from helpers import Array, dense, planted_global, planted_local
+from helpers import Array, dense, planted_global, planted_local, ran
 
 STORAGES = ("csr", "csc", "triplet", "dense")
 MATRICES = ("W", "V", "R", "M", "H", "G")
@@ -551,14 +551,7 @@ def siconos() -> str:
 
 def ask(siconos: str, folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     answers = folder / "answers.json"
-    result = subprocess.run(
-        [siconos, "-c", PEER, answers],
-        input=json.dumps(jobs),
-        capture_output=True,
-        text=True,
-        cwd=folder,
-    )
-    assert result.returncode == 0, result.stderr[-2000:]
+    ran(siconos, "-c", PEER, answers, input=json.dumps(jobs), cwd=folder)
     found = json.loads(answers.read_text())
     assert isinstance(found, list)
     return found

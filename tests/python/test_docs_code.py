@@ -12,7 +12,6 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import types
 from pathlib import Path
@@ -27,7 +26,7 @@ from capi_library import compile_fortran, compile_program
 from doc_blocks import WORDS, Block, blocks_of, pages
 from fclib import bench
 from fclib.cli import app
-from helpers import planted_local
+from helpers import planted_local, ran
 from helpers_report import make_store
 
 pytest.importorskip("mujoco")
@@ -300,14 +299,9 @@ def run_octave(code: str, scratch: Path) -> None:
     (scratch / "block.m").write_text(code)
     fclib.write(scratch / "problem.hdf5", planted_local(1).problem)
     programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        [octave, "--no-init-file", "block.m"],
-        cwd=scratch,
-        env=os.environ | {"PATH": programs},
-        capture_output=True,
-        text=True,
+    done = ran(
+        octave, "--no-init-file", "block.m", cwd=scratch, env=os.environ | {"PATH": programs}
     )
-    assert done.returncode == 0, done.stderr
     line = done.stdout.splitlines()[-1]
     assert line in ("6 contacts, 324 entries in W", "0 errors"), done.stdout
 
@@ -330,6 +324,5 @@ def test_blocks_in_other_languages(block: Block, scratch: Path, root: Path) -> N
         program = compile_fortran(source, scratch / "block")
     else:
         program = compile_program(source, scratch / "block")
-    done = subprocess.run([program, "problem.hdf5"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = ran(program, "problem.hdf5")
     assert done.stdout

@@ -24,7 +24,8 @@ from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
 from fclib.bench.fingerprint import version_of
 from fclib.external import command, siconos
-from helpers import local_problem, planted_global, planted_local, planted_rolling
+from helpers import local_problem, planted_global, planted_local, planted_rolling, ran
+from helpers_cli import run
 
 DOCS = "docs/solvers-of-your-own.md"
 
@@ -298,13 +299,7 @@ def test_entry_points_are_found(tmp_path: Path) -> None:
         print(entry.origin, entry.title)
         """
     )
-    run = subprocess.run(
-        [sys.executable, "-c", script],
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    run = ran(sys.executable, "-c", script, env=os.environ | {"PYTHONPATH": str(tmp_path)})
     assert run.stdout.splitlines() == ["converged", "a_contact_package Comes with a package."]
     assert "broken" in run.stderr  # is said, and stops nothing
 
@@ -319,9 +314,7 @@ def test_the_documented_solver_is_the_example_and_runs(root: Path, tmp_path: Pat
     assert code in example.read_text()
     path = tmp_path / "problem.hdf5"
     fclib.write(path, problem_of())
-    run = subprocess.run(
-        [sys.executable, str(example), str(path)], capture_output=True, text=True, check=True
-    )
+    run = ran(sys.executable, example, path)
     assert "Result my-pgs: converged" in run.stdout
     assert "Result auto: converged" in run.stdout
 
@@ -371,13 +364,9 @@ def test_a_program_may_write_into_its_input(tmp_path: Path) -> None:
     assert fclib.solve(problem_of(), solver, 1e-6).converged
     path = tmp_path / "problem.hdf5"
     fclib.write(path, problem_of())
-    run = subprocess.run(
-        [sys.executable, "-m", "fclib", "solve", "--solver", solver, str(path)],
-        capture_output=True,
-        text=True,
-    )
-    assert run.returncode == 0, run.stderr
-    assert "converged" in run.stdout
+    done = run("solve", "--solver", solver, path)
+    assert done.returncode == 0, done.stderr
+    assert "converged" in done.stdout
 
 
 def is_running(pid: int) -> bool:
@@ -793,13 +782,8 @@ def test_a_shared_object_solves_rolling_problems(shared_objects: Path, d: int) -
 def test_shared_objects_from_c(shared_objects: Path, tmp_path: Path) -> None:
     fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
     program = compile_program(ROOT / "tests/capi/plugin.c", tmp_path / "plugin")
-    done = subprocess.run(
-        [program, tmp_path / "a.hdf5", f"plugin:{shared_objects}/libpgs.so"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(program, tmp_path / "a.hdf5", f"plugin:{shared_objects}/libpgs.so", timeout=60)
+    assert done.stderr == ""
 
 
 def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
@@ -844,15 +828,7 @@ def test_a_shared_object_whose_description_throws(shared_objects: Path) -> None:
 
 def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -> None:
     fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "fclib", "bench", "--problems", "a.hdf5"),
-            *("--solver", f"plugin:{shared_objects}/libpgs.so step=0.9", "--store", "store.db"),
-        ],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-    )
-    assert done.returncode == 0, done.stderr + done.stdout
+    words = ("-m", "fclib", "bench", "--problems", "a.hdf5", "--store", "store.db", "--solver")
+    ran(sys.executable, *words, f"plugin:{shared_objects}/libpgs.so step=0.9", cwd=tmp_path)
     with sqlite3.connect(tmp_path / "store.db") as store:
         assert store.execute("select status from runs").fetchall() == [("converged",)]

@@ -23,7 +23,7 @@ import helpers_cli
 from fclib import _core, _registry, bench
 from fclib.bench.job import Limits, Record, SolverChoice
 from fclib.collections import catalog
-from helpers import planted_local
+from helpers import planted_local, ran
 from helpers_bench import facts_of
 from helpers_report import read_data, skip_without_libraries
 
@@ -351,12 +351,7 @@ def test_a_full_disk_is_one_line(problem: Path, tmp_path: Path) -> None:
     ]
     said = []
     for command in commands:
-        done = subprocess.run(
-            [sys.executable, "-m", "fclib", *map(str, command)],
-            capture_output=True,
-            text=True,
-            preexec_fn=limited,
-        )
+        done = ran(sys.executable, "-m", "fclib", *command, code=None, preexec_fn=limited)
         assert "Traceback" not in done.stderr, done.stderr
         if done.returncode:
             said.append(done.stderr)

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 import fclib
 from fclib import scenes
-from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, stored
+from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, ran, stored
 
 Draw: TypeAlias = Callable[[st.SearchStrategy[Any]], Any]
 Layout: TypeAlias = dict[str, tuple[str, tuple[int, ...]]]
@@ -800,8 +800,7 @@ def test_a_disk_that_fills_up_leaves_the_old_file(written: Path) -> None:
     assert resource.RLIMIT_FSIZE >= 0
     path = written / "p.hdf5"
     before = path.read_bytes()
-    run = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    run = ran(sys.executable, "-c", code, path)
     assert run.stdout.startswith(str(path))
     assert path.read_bytes() == before
     assert names_in(written) == ["p.hdf5"]
@@ -868,10 +867,7 @@ def test_what_is_no_file_is_neither_read_nor_replaced(fifo: Path, call: str) -> 
         f"try:\n    fclib.{call}\n"
         "except fclib.FileError as error:\n    print(error)\n"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", code, fifo], capture_output=True, text=True, timeout=300
-    )
-    assert run.returncode == 0, run.stderr
+    run = ran(sys.executable, "-c", code, fifo, timeout=300)
     assert str(fifo) in run.stdout
     assert fifo.is_fifo()
 
@@ -1032,10 +1028,8 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     apart = ["unshare", "--mount", "--map-root-user"]
     if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
         pytest.skip("no file system can be mounted")
-    run = subprocess.run(
-        [*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path], capture_output=True, text=True
-    )
-    assert (run.returncode, run.stderr) == (0, "")
+    run = ran(*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path)
+    assert run.stderr == ""
     assert run.stdout.splitlines() == [
         f"{tmp_path}/a.hdf5: cannot be written: {os.strerror(errno.ENOSPC)}",
         "160 ['a.hdf5']",

@@ -6,7 +6,6 @@ Each case takes a good mixed local file, or a global one, and spoils one thing.
 import json
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +18,7 @@ import pytest
 import fclib
 import helpers_cli
 from capi_library import CAPI, compile_program
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 
 ROOT = "fclib_local"
 Spoil = Callable[[h5py.File], None]
@@ -600,8 +599,8 @@ def copied(corpus: Path, tmp_path: Path) -> Path:
 def refusals(program: Path, files: dict[Path, str], *tool: str) -> list[tuple[str, str]]:
     """For each file, in which of the kinds it is read, the step that refuses it and the message."""
     asked = "".join(f"{kind} {path}\n" for path, kind in files.items())
-    run = subprocess.run([*tool, program], input=asked, capture_output=True, text=True, timeout=300)
-    assert (run.returncode, run.stderr) == (0, ""), run.stdout[-300:] + run.stderr[-600:]
+    run = ran(*tool, program, input=asked, timeout=300)
+    assert run.stderr == "", run.stdout[-300:] + run.stderr[-600:]
     found = [line.partition("\t") for line in run.stdout.splitlines()]
     assert len(found) == len(files)
     return [(step, message) for step, _, message in found]
@@ -814,12 +813,7 @@ def test_flipped_bytes_never_do_worse_than_an_error(corpus: Path, tmp_path: Path
         "        refused += 1\n"
         "print(refused)\n"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", code, corpus / "good.hdf5", tmp_path / "flipped.hdf5"],
-        capture_output=True,
-        text=True,
-    )
-    assert run.returncode == 0, run.stderr[-2000:]
+    run = ran(sys.executable, "-c", code, corpus / "good.hdf5", tmp_path / "flipped.hdf5")
     assert int(run.stdout) > 100
     # after damaged metadata HDF5 1.10 may say, as the process ends, that it could not close its own
     # objects: "HDF5: infinite loop closing library" and a line of their names
@@ -878,9 +872,7 @@ def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) 
         del file[name]
         file[name] = h5py.ExternalLink("pipe", "/there")
     code = f"import fclib; fclib.read({str(path)!r}); print(fclib.read_solution({str(path)!r}))"
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
-    )
+    run = ran(sys.executable, "-c", code, code=None, timeout=100)
     words = "is an external link to '/there' of the file 'pipe', which is not followed"
     assert f"/{name}: {words}" in run.stderr
 

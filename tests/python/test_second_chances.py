@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import pickle
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,7 +19,7 @@ import pytest
 import fclib
 from fclib import _core
 from fclib.scenes.packing import Packing
-from helpers import auto_chain, local_problem, planted_global, planted_local
+from helpers import auto_chain, local_problem, planted_global, planted_local, ran
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -318,10 +317,7 @@ first = fclib.solve(problem)
 (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")
 print(first.cpu_s, fclib.solve(problem, chain=text).setup_s)
 """
-    told = [
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        for _ in range(5)
-    ]
+    told = [ran(sys.executable, "-c", code) for _ in range(5)]
     first, reading = np.array([run.stdout.split() for run in told], dtype=float).min(axis=0)
     assert first < 0.5 * reading
 

@@ -24,7 +24,7 @@ import pytest
 import fclib
 from capi_library import compile_program
 from doc_blocks import blocks_of
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 from helpers_cli import run
 
 KILLS = 60
@@ -170,8 +170,7 @@ def test_it_is_read_while_it_grows(tmp_path: Path) -> None:
         steps.refresh()
         assert len(steps) == k + 1
         assert steps[k].q[0] == -k
-        done = subprocess.run([*other, path], capture_output=True, text=True)
-        assert done.stdout == f"{k + 1}\n", done.stderr
+        assert ran(*other, path).stdout == f"{k + 1}\n"
     with h5py.File(path, swmr=True) as file:
         assert len(file["fclib_sequence/steps"]) == 3
     with pytest.raises(fclib.FileError, match="another writer has it open"):
@@ -389,10 +388,8 @@ def test_a_full_disk_leaves_the_confirmed_steps(tmp_path: Path) -> None:
     apart = ["unshare", "--mount", "--map-root-user"]
     if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
         pytest.skip("no file system can be mounted")
-    done = subprocess.run(
-        [*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path], capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path)
+    assert done.stderr == ""
     assert done.stdout.splitlines() == [
         f"{tmp_path}/run.h5: cannot be written: {os.strerror(errno.ENOSPC)}",
         "1",
@@ -637,9 +634,7 @@ def test_c_refuses_what_would_spoil_a_step(tmp_path: Path) -> None:
     path, source = tmp_path / "run.h5", tmp_path / "twice.c"
     source.write_text(TWICE)
     program = compile_program(source, tmp_path / "twice")
-    done = subprocess.run([program, path], capture_output=True, text=True)
-    first, second, third = done.stdout.splitlines()
-    assert done.returncode == 0
+    first, second, third = ran(program, path).stdout.splitlines()
     assert "has no step yet" in first
     assert "world: is -1, but must be 0 or more" in second
     assert "/solution/u: was already given to this step" in third
@@ -785,7 +780,7 @@ def test_libfclib_3_1_says_that_it_reads_none(solved: Path, tmp_path: Path) -> N
     )
     program = tmp_path / "peer"
     subprocess.run(["cc", source, "-o", program, "-lfclib"], check=True)
-    done = subprocess.run([program, solved], capture_output=True, text=True, timeout=60)
+    done = ran(program, solved, code=None, timeout=60)
     assert done.returncode > 0, "it ended by a signal, or read something"
     assert "fclib_local" in done.stderr or "problem" in done.stderr, done.stderr
     plain = tmp_path / "plain.hdf5"

@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -20,6 +19,7 @@ from fclib import collections
 from fclib.collections import catalog, set_index
 from fclib.collections.plan import Plan
 from fclib.scenes.local_problems import LocalProblems
+from helpers import ran
 from helpers_cli import invoke
 from workshop.sets import choose
 
@@ -128,8 +128,8 @@ def test_tiny_needs_neither_pyarrow_nor_mujoco() -> None:
         "import fclib\n"
         "print(fclib.load('tiny/RollingDiscs/0040').formulation)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == fclib.load("tiny/RollingDiscs/0040").formulation, done.stderr
+    done = ran(sys.executable, "-c", code)
+    assert done.stdout.strip() == fclib.load("tiny/RollingDiscs/0040").formulation
 
 
 def close(first: Any, second: Any) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from fclib.cli import app
 from fclib.external import siconos
 from fclib.scenes import Scene
 from fclib.scenes.shared import siconos_input
-from helpers import needs_siconos_mechanics
+from helpers import needs_siconos_mechanics, ran
 
 pytest.importorskip("mujoco")
 pytest.importorskip("h5py")
@@ -261,7 +260,7 @@ with runner.MechanicsHdf5Runner(mode="w", io_filename=sys.argv[1]) as io:
 def test_what_siconos_itself_writes_is_read(tmp_path: Path) -> None:
     needs_siconos_mechanics()
     path = tmp_path / "own.hdf5"
-    done = subprocess.run([siconos.python(), "-c", WRITES, path], capture_output=True, text=True)
+    done = ran(siconos.python(), "-c", WRITES, path, code=None)
     assert path.is_file(), done.stderr
     scene = Scene.from_file(path, time_step=1e-3)
     model: Any = model_of(scene)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import fclib
 from fclib import _core, collections
 from fclib.scenes import Scene
 from fclib.scenes.shared.interaction import Course, Drive, Interaction
-from helpers import dense
+from helpers import dense, ran
 from helpers_cli import run as command
 from helpers_simulate import mujoco_of
 
@@ -744,9 +743,7 @@ def test_a_policy_by_its_file(tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "mine.py").write_text("def zero(time, state):\n    return [0.0]\n")
     code = "from fclib.simulate import control_of; print(control_of('sub/mine.py:zero')(0, None))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    done = ran(sys.executable, "-c", code, cwd=tmp_path)
     assert done.stdout.strip() == "[0.0]"
 
 

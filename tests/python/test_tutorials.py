@@ -14,6 +14,7 @@ import pytest
 
 from capi_library import compiler, library_folder
 from doc_blocks import blocks_of, tutorials
+from helpers import ran
 
 pytest.importorskip("mujoco")
 
@@ -55,9 +56,7 @@ def test_a_tutorial_works_as_it_is_written(page: Path, tmp_path: Path) -> None:
             continue
         assert block.language == "sh", f"{block}: neither a file nor commands"
         for line in block.commands():
-            done = subprocess.run(
-                ["sh", "-c", line], cwd=folder, env=environment, capture_output=True, text=True
-            )
+            done = ran("sh", "-c", line, code=None, cwd=folder, env=environment)
             said = (done.stdout + done.stderr)[-3000:]
             assert done.returncode == 0, f"{block}: {line}\n{said}"
             commands += 1

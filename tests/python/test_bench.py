@@ -20,15 +20,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 import helpers_cli
-from fclib import bench, cli
+from fclib import bench
 from fclib._solve import MERITS
 from fclib.bench import problems
 from fclib.bench.job import Job, Record
 from helpers import planted_global, planted_local, ran
+from helpers_cli import invoke
 
 KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
 RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "200"))
@@ -352,7 +352,7 @@ def test_interrupted_before_there_is_a_store(
     command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
     command += ["--scheduler", "tcp://localhost:1", "--store", store]
     before = signal.getsignal(signal.SIGINT)
-    result = CliRunner().invoke(cli.app, list(map(str, command)))
+    result = invoke(*command)
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
     assert signal.getsignal(signal.SIGINT) is before
@@ -630,7 +630,7 @@ def test_the_campaign_that_stops_says_so_and_exits_with_1(
     arguments += ["--store", str(store), "--retries", "0"]
     lost = Record("lost", "gone")
     monkeypatch.setattr("fclib.bench.pool.run", lambda jobs, _: ((job, lost) for job in jobs))
-    done = CliRunner().invoke(cli.app, arguments)
+    done = invoke(*arguments)
     assert done.exit_code == 1
     assert "stopped: 1 of 1 run could not be done" in " ".join(done.stderr.split())
     assert bench.Store(store).results() == []

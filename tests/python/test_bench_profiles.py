@@ -16,15 +16,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from typer.testing import CliRunner
 
 import helpers_cli
 from fclib import bench
 from fclib._solve import MERITS
 from fclib.bench import campaign, profiles
 from fclib.bench.job import Job, Record
-from fclib.cli import app
 from helpers_bench import facts_of
+from helpers_cli import invoke
 
 # CPU times of three solvers on four problems; None: failed
 TIMES: dict[str, list[float | None]] = {
@@ -675,9 +674,9 @@ def test_two_merits_are_not_mixed(store: Path) -> None:
     assert {row["merit"] for row in profiles.load(store, merit="both")} == {"both"}
     rows = profiles.load(store, merit="natural")
     assert {row["solver"] for row in rows} == {"A"}
-    refused = CliRunner().invoke(app, ["profile", str(store)])
+    refused = invoke("profile", store)
     assert refused.exit_code == 1
-    shown = CliRunner().invoke(app, ["profile", str(store), "--merit", "natural"])
+    shown = invoke("profile", store, "--merit", "natural")
     assert shown.exit_code == 0
     assert "natural map of the literature alone" in " ".join(shown.output.split())
 
@@ -787,7 +786,7 @@ def test_figures_that_are_unsteady_or_of_a_busy_machine_are_marked(store: Path) 
         opened.db.execute("UPDATE runs SET load = 1.5")
         opened.db.execute("UPDATE runs SET load = 2.5 WHERE id = 9")  # of C
         opened.seal()
-    shown = CliRunner().invoke(app, ["profile", str(store)])
+    shown = invoke("profile", store)
     assert shown.exit_code == 0, shown.output
     lines = [line for line in shown.output.splitlines() if line.startswith(("A ", "B ", "C "))]
     means = {line[0]: line for line in lines[:3]}

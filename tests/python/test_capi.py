@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 import capi_abi
 import fclib
@@ -26,8 +25,8 @@ from capi_library import (
     compile_program,
     library_folder,
 )
-from fclib.cli import app
 from helpers import Array, dense, modified, planted_global, planted_local, project, ran
+from helpers_cli import invoke
 
 # where libfclib 3.1 is installed, or unpacked with what it needs
 PEER = Path(os.environ.get("FCLIB_PEER", "/usr"))
@@ -259,7 +258,7 @@ def test_the_bodies_of_the_example_are_drawn(stack_example: Path, tmp_path: Path
     assert force[:4].sum() == pytest.approx(force[4] + 9.81e-3)
     for name in ("view", "bare"):
         page = tmp_path / f"{name}.html"
-        shown = CliRunner().invoke(app, ["view", str(path), "--out", str(page)])
+        shown = invoke("view", path, "--out", page)
         assert shown.exit_code == 0, shown.output
         assert ('"ball"' in page.read_text()) == (name == "view")
         fclib.write(path, problem.replace(contacts=None, bodies=None), mode="replace")

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from ball_judge import judge
-from fclib.cli import app
 from helpers import Array, bodies, case, dense, planted_global, planted_local
+from helpers_cli import invoke
 
 TOLERANCE = 1e-8
 # the part that is wrong and by how much [m/s]
@@ -29,23 +28,23 @@ WRONG = {
 def test_a_stored_velocity_that_is_wrong_is_named(name: str) -> None:
     path = case(f"{name}.hdf5")
     part, size = WRONG[name]
-    answer = CliRunner().invoke(app, ["check", str(path), "--json"])
+    answer = invoke("check", path, "--json")
     assert answer.exit_code == 1
     record = json.loads(answer.stdout.strip().splitlines()[-1])
     assert record["status"] == "wrong"
     assert record["error"] > 0.5
     named = {one["part"]: one for one in record["mismatches"]}
     assert abs(named[part]["difference"]) == pytest.approx(size, rel=0.01)
-    assert f"{part}[{named[part]['index']}]" in CliRunner().invoke(app, ["check", str(path)]).output
+    assert f"{part}[{named[part]['index']}]" in invoke("check", path).output
 
 
 def test_a_grain_flung_up_is_not_ok() -> None:
     path = case("cx11_merit_small_grain.hdf5")
-    answer = CliRunner().invoke(app, ["check", str(path), "--json"])
+    answer = invoke("check", path, "--json")
     record = json.loads(answer.stdout)
     assert record["status"] == "wrong"
     assert record["scaled_natural"] == pytest.approx(3.99, abs=0.02)
-    assert CliRunner().invoke(app, ["check", str(path), "--merit", "natural"]).exit_code == 0
+    assert invoke("check", path, "--merit", "natural").exit_code == 0
 
 
 def test_small_masses_are_solved_in_both_merits() -> None:

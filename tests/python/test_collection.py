@@ -22,11 +22,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import scenes
-from fclib.cli import app
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -146,13 +144,13 @@ def test_problems_are_found_by_a_condition(built: Path, condition: str, wanted: 
     ids = [row["id"] for row in table.to_pylist() if wanted(row)]
     assert catalog.where(table, condition)["id"].to_pylist() == ids
     words = ["collection", "find", condition, "--in", str(built)]
-    done = CliRunner().invoke(app, [*words, "--files"])
+    done = invoke(*words, "--files")
     assert done.exit_code == 0
     assert [Path(line).parts[-1][:4] for line in done.output.splitlines()] == [
         one[-4:] for one in ids
     ]
     assert all(Path(line).is_file() for line in done.output.splitlines())
-    assert f"{len(ids)} of 12 problems" in CliRunner().invoke(app, words).output
+    assert f"{len(ids)} of 12 problems" in invoke(*words).output
 
 
 def test_info_carries_what_the_family_says(built: Path) -> None:

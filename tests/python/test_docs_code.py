@@ -19,7 +19,6 @@ from typing import Any
 
 import pytest
 import typer
-from typer.testing import CliRunner
 
 import fclib
 from capi_library import compile_fortran, compile_program
@@ -27,6 +26,7 @@ from doc_blocks import WORDS, Block, blocks_of, pages
 from fclib import bench
 from fclib.cli import app
 from helpers import planted_local, ran
+from helpers_cli import invoke
 from helpers_report import make_store
 
 pytest.importorskip("mujoco")
@@ -228,7 +228,7 @@ def call(line: str) -> None:
     for word in shlex.split(line)[1:]:
         expands = "*" in word and f"'{word}'" not in line
         words += sorted(str(path) for path in Path().glob(word)) if expands else [word]
-    result = CliRunner().invoke(app, words)
+    result = invoke(*words)
     assert result.exit_code == 0, f"{line}\n{result.output[-2000:]}\n{result.exception!r}"
 
 

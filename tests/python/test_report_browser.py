@@ -25,6 +25,7 @@ from helpers_browser import (
     served,
     turn,
 )
+from helpers_cli import invoke
 from helpers_report import (
     LABELS,
     make_collection,
@@ -751,10 +752,7 @@ def test_a_selection_is_fetched_by_its_list(
     chosen: str, opening: Any, masonry: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The list that the catalogue saves, and the page's own command, on a served site."""
-    from typer.testing import CliRunner
-
     from fclib import collections
-    from fclib.cli import app
 
     go = opening(masonry)
     page = go(SELECTIONS[chosen])
@@ -777,7 +775,7 @@ def test_a_selection_is_fetched_by_its_list(
         for out, place in places.items():
             known = {"URL": str(place), "collection": out}
             words = ["collection", *(known.get(word, word) for word in line.split()[2:])]
-            done = CliRunner().invoke(app, words)
+            done = invoke(*words)
             assert done.exit_code == 0, done.output
     files = [sorted(p.relative_to(out) for p in Path(out).rglob("*.hdf5")) for out in places]
     assert files[0] == files[1] == files[2]

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
-from fclib.cli import app
 from fclib.external import siconos
 from fclib.scenes import Scene
 from fclib.scenes.shared import siconos_input
@@ -23,6 +21,7 @@ import h5py
 import mujoco
 
 from fclib.simulate import model_of, simulate
+from helpers_cli import invoke
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 CORNERS = np.array([(x, y, z) for x in (-1.5, 1.5) for y in (-0.5, 0.5) for z in (-0.25, 0.25)])
@@ -227,13 +226,13 @@ def test_a_file_becomes_problems_by_one_command(tmp_path: Path) -> None:
     with begun(path) as file:
         contactor(body(file, "ball", (0, 0, 0.5001), mass=1.0), "Ball")
     command = ["simulate", str(path), "--steps", "12", "--out", str(tmp_path / "out")]
-    lacking = CliRunner().invoke(app, command)
+    lacking = invoke(*command)
     assert lacking.exit_code != 0
     assert "does not have the time step" in lacking.output
     command += ["--time-step", "0.002", "--no-pictures"]
-    refused = CliRunner().invoke(app, [*command, "--restitution", "0.5"])
+    refused = invoke(*command, "--restitution", "0.5")
     assert "has its own restitution" in refused.output
-    done = CliRunner().invoke(app, command)
+    done = invoke(*command)
     assert done.exit_code == 0, done.output
     files = sorted((tmp_path / "out").rglob("*-global.hdf5"))
     assert files

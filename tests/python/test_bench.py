@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,7 @@ def campaign(**changes: Any) -> bench.Campaign:
     return bench.Campaign.of(entries | changes)
 
 
-def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return helpers_cli.run("bench", *arguments)
+run_cli = partial(helpers_cli.run, "bench")
 
 
 # ---- what is run
@@ -352,8 +352,7 @@ def test_interrupted_before_there_is_a_store(
     command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
     command += ["--scheduler", "tcp://localhost:1", "--store", store]
     before = signal.getsignal(signal.SIGINT)
-    result = invoke(*command)
-    assert result.exit_code == 130
+    result = invoke(*command, code=130)
     assert "interrupted" in result.stderr
     assert signal.getsignal(signal.SIGINT) is before
     assert not store.exists()
@@ -362,8 +361,7 @@ def test_interrupted_before_there_is_a_store(
 def test_merge(small: Path, tmp_path: Path) -> None:
     elsewhere(small, tmp_path / "other.sqlite", "other")
     merged = tmp_path / "merged.sqlite"
-    done = run_cli("merge", merged, small, tmp_path / "other.sqlite")
-    assert done.returncode == 0, done.stderr
+    run_cli("merge", merged, small, tmp_path / "other.sqlite")
     with bench.Store(merged) as store, bench.Store(small) as first:
         rows, original = store.results(), first.results()
         assert len(rows) == 2 * len(original)
@@ -376,7 +374,7 @@ def test_merge(small: Path, tmp_path: Path) -> None:
         # once more changes nothing
         assert store.merge([small, tmp_path / "other.sqlite"]) == 0
         assert len(store.status()) == 1
-    assert run_cli("merge", merged, merged).returncode == 1
+    run_cli("merge", merged, merged, code=1)
 
 
 def test_some_of_the_runs(small: Path) -> None:
@@ -395,8 +393,7 @@ def test_export(small: Path, tmp_path: Path) -> None:
         rows, columns = store.results(), store.columns()
     assert list(rows[0]) == columns
     for name in ("runs.csv", "runs.parquet"):
-        done = run_cli("export", small, tmp_path / name)
-        assert done.returncode == 0, done.stderr
+        run_cli("export", small, tmp_path / name)
     assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == rows
     import csv
 
@@ -404,12 +401,11 @@ def test_export(small: Path, tmp_path: Path) -> None:
         read = list(csv.DictReader(file))
     assert [float(row["error"]) for row in read] == [row["error"] for row in rows]
     assert sorted(tmp_path.iterdir()) == [tmp_path / "runs.csv", tmp_path / "runs.parquet"]
-    assert run_cli("export", small, tmp_path / "runs.txt").returncode == 1
+    run_cli("export", small, tmp_path / "runs.txt", code=1)
 
 
 def test_status(small: Path) -> None:
     done = run_cli("--status", small, "--json")
-    assert done.returncode == 0, done.stderr
     (record,) = map(json.loads, done.stdout.splitlines())
     assert (record["state"], record["runs"], record["solved"]) == ("finished", "18 of 18", 18)
     assert "finished" in run_cli("--status", small).stdout
@@ -433,7 +429,7 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         bench.Store(tmp_path)
     with pytest.raises(bench.StoreError, match="there is no folder"):
         bench.Store(tmp_path / "absent" / "new.sqlite")
-    assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
+    run_cli("--status", tmp_path / "absent.sqlite", code=1)
     assert not (tmp_path / "absent.sqlite").exists()
 
 
@@ -457,8 +453,8 @@ def test_what_is_no_store_is_not_made_one(tmp_path: Path) -> None:
 def test_what_cannot_be_merged_leaves_no_store(tmp_path: Path) -> None:
     new, wrong = tmp_path / "new.sqlite", tmp_path / "wrong.parquet"
     wrong.write_text("no table")
-    assert run_cli("merge", new, tmp_path / "none.sqlite").returncode == 1
-    assert run_cli("merge", new, wrong).returncode == 1
+    run_cli("merge", new, tmp_path / "none.sqlite", code=1)
+    run_cli("merge", new, wrong, code=1)
     with pytest.raises(RuntimeError), bench.Store(new):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == [wrong]
@@ -630,8 +626,7 @@ def test_the_campaign_that_stops_says_so_and_exits_with_1(
     arguments += ["--store", str(store), "--retries", "0"]
     lost = Record("lost", "gone")
     monkeypatch.setattr("fclib.bench.pool.run", lambda jobs, _: ((job, lost) for job in jobs))
-    done = invoke(*arguments)
-    assert done.exit_code == 1
+    done = invoke(*arguments, code=1)
     assert "stopped: 1 of 1 run could not be done" in " ".join(done.stderr.split())
     assert bench.Store(store).results() == []
 
@@ -1012,17 +1007,16 @@ def test_files_folders_and_globs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_a_campaign_by_flags(tmp_path: Path) -> None:
     fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
     path = tmp_path / "store.sqlite"
-    done = run_cli(
+    run_cli(
         *("--problems", tmp_path / "*.hdf5", "--solver", "nsgs", "--solver", "nsgs relaxation=1.1"),
         *("--tol", "1e-4", "--tol", "1e-6", "--time-limit", "5", "--store", path),
     )
-    assert done.returncode == 0, done.stderr
     with bench.Store(path) as store:
         rows = store.results()
     assert len(rows) == 4
     assert {row["time_limit"] for row in rows} == {5}
-    assert run_cli("--problems", tmp_path).returncode == 2
-    assert run_cli("nowhere.toml").returncode == 2
+    run_cli("--problems", tmp_path, code=2)
+    run_cli("nowhere.toml", code=2)
 
 
 def test_the_published_campaigns_are_understood(

@@ -179,8 +179,7 @@ def test_the_loss_of_the_scheduler_ends_in_a_line_and_the_campaign_goes_on(
     assert "Traceback" not in out
     assert 3 <= done(store) < 24
     # the others are done by another scheduler
-    again = helpers_cli.run(*command, "--scheduler", scheduler.scheduler.address)
-    assert again.returncode == 0, again
+    helpers_cli.run(*command, "--scheduler", scheduler.scheduler.address)
     assert done(store) == 24
 
 

@@ -6,8 +6,8 @@ import csv
 import dataclasses
 import json
 import math
-import subprocess
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -79,8 +79,7 @@ def store(tmp_path: Path) -> Path:
     return tmp_path / "hand.sqlite"
 
 
-def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return helpers_cli.run("profile", *arguments)
+run_cli = partial(helpers_cli.run, "profile")
 
 
 # ---- by hand
@@ -674,10 +673,8 @@ def test_two_merits_are_not_mixed(store: Path) -> None:
     assert {row["merit"] for row in profiles.load(store, merit="both")} == {"both"}
     rows = profiles.load(store, merit="natural")
     assert {row["solver"] for row in rows} == {"A"}
-    refused = invoke("profile", store)
-    assert refused.exit_code == 1
+    invoke("profile", store, code=1)
     shown = invoke("profile", store, "--merit", "natural")
-    assert shown.exit_code == 0
     assert "natural map of the literature alone" in " ".join(shown.output.split())
 
 
@@ -744,7 +741,6 @@ def test_the_tables_and_the_pictures(store: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     fill(store, {name: [2 * t if t else None for t in own] for name, own in TIMES.items()}, 1e-9)
     done = run_cli(store, "--out", tmp_path / "out", "--format", "svg")
-    assert done.returncode == 0, done.stderr
     for word in ("virtual best", "cpu_limit", "95 % interval", "CPU time [s]", "few", "<= 2x"):
         assert word in done.stdout
     # one tolerance a curve
@@ -765,8 +761,7 @@ def test_names_that_matplotlib_would_read_otherwise(store: Path, tmp_path: Path)
         for name, other in (("A", "_hidden"), ("B", "$x^$ cost"), ("C", r"C:\\x_{")):
             opened.db.execute("UPDATE solvers SET label = ? WHERE label = ?", (other, name))
         opened.seal()
-    done = run_cli(store, "--out", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
+    run_cli(store, "--out", tmp_path / "out")
     # in each of the formats
     for name in ("performance-cpu_s", "data-cpu_s", "convergence", "runtimes"):
         for kind, start in (("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")):
@@ -787,7 +782,6 @@ def test_figures_that_are_unsteady_or_of_a_busy_machine_are_marked(store: Path) 
         opened.db.execute("UPDATE runs SET load = 2.5 WHERE id = 9")  # of C
         opened.seal()
     shown = invoke("profile", store)
-    assert shown.exit_code == 0, shown.output
     lines = [line for line in shown.output.splitlines() if line.startswith(("A ", "B ", "C "))]
     means = {line[0]: line for line in lines[:3]}
     assert " ~ " in means["B"]
@@ -828,10 +822,9 @@ def test_tolerances_that_are_one_number(tmp_path: Path) -> None:
 
 def test_json(store: Path) -> None:
     done = run_cli(store, "--json", "--metric", "iterations", "--solver", "B", "--solver", "A")
-    assert done.returncode == 0, done.stderr
     records = [json.loads(line) for line in done.stdout.splitlines()]
     summary = {r["solver"]: r for r in records if r["table"] == "summary"}
     assert set(summary) == {"virtual best", "A", "B"}
     assert summary["A"]["solved"] == 3
-    assert run_cli(store, "--solver", "Z").returncode == 1
-    assert run_cli(store.with_name("absent.sqlite")).returncode == 1
+    run_cli(store, "--solver", "Z", code=1)
+    run_cli(store.with_name("absent.sqlite"), code=1)

@@ -43,8 +43,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before, out = contents(source), tmp_path / "collection"
-    result = invoke("collection", "add", source, "--out", out)
-    assert result.exit_code == 1
+    result = invoke("collection", "add", source, "--out", out, code=1)
     assert "torn.hdf5" in result.stderr
     assert contents(source) == before
     rows = collections.read_catalog(out).to_pylist()
@@ -72,7 +71,7 @@ def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.Mo
     invoke(*arguments)
     paths = list(quick.glob("from_afar/*/*.hdf5"))
     assert sum(read_solution(path) is None for path in paths) == 1
-    assert invoke("check", *paths).exit_code == 0
+    invoke("check", *paths)
     assert all(verdict.ok for verdict in collections.verify(quick))
     monkeypatch.setenv("FCLIB_COLLECTION", str(out))
     assert len(fclib.collection("from_afar")) == 3
@@ -185,8 +184,7 @@ def test_a_name_that_no_catalogue_holds_is_left_out(source: Path, tmp_path: Path
     except OSError:
         pytest.skip("the file system has names in UTF-8 alone")
     out = tmp_path / "out"
-    result = invoke("collection", "add", source, "--out", out)
-    assert result.exit_code == 1
+    result = invoke("collection", "add", source, "--out", out, code=1)
     assert "its name is not UTF-8" in " ".join(result.stderr.split())
     rows = catalog.read_catalog(out).to_pylist()
     assert found[0].relative_to(source).as_posix() in {row["source"] for row in rows}

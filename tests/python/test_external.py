@@ -365,7 +365,6 @@ def test_a_program_may_write_into_its_input(tmp_path: Path) -> None:
     path = tmp_path / "problem.hdf5"
     fclib.write(path, problem_of())
     done = run("solve", "--solver", solver, path)
-    assert done.returncode == 0, done.stderr
     assert "converged" in done.stdout
 
 

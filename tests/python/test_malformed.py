@@ -553,9 +553,8 @@ def test_what_is_optional_never_costs_the_problem(corpus: Path, tmp_path: Path, 
     (line,) = fclib.left_out(path)
     assert OPTIONAL[case][1] in line
     run = helpers_cli.run("info", str(path))
-    assert run.returncode == 0, run.stderr
     assert run.stderr == f"fclib: {path}: {line}: left out\n"
-    assert helpers_cli.run("solve", str(path)).returncode == 0
+    helpers_cli.run("solve", str(path))
 
 
 def test_nothing_is_left_out_of_a_good_file(corpus: Path) -> None:
@@ -568,8 +567,7 @@ def test_the_commands_say_one_line_for_each_spoilt_file(corpus: Path, command: l
     paths = [str(path_of(corpus, case)) for case in CASES]
     before = {path: Path(path).read_bytes() for path in paths}
     arguments = [*command, "--json", *paths, str(corpus / "good.hdf5")]
-    run = helpers_cli.run(*arguments)
-    assert run.returncode == 1
+    run = helpers_cli.run(*arguments, code=1)
     lines = run.stderr.splitlines()
     assert len(lines) == len(paths), run.stderr
     for line, path in zip(lines, paths, strict=True):
@@ -853,8 +851,7 @@ def spoilt_solution(corpus: Path, folder: Path, case: str) -> Path:
 
 def test_check_names_what_is_wrong_with_a_solution(corpus: Path, tmp_path: Path) -> None:
     paths = {case: spoilt_solution(corpus, tmp_path, case) for case in SOLUTIONS}
-    run = helpers_cli.run("check", *paths.values())
-    assert run.returncode == 1
+    run = helpers_cli.run("check", *paths.values(), code=1)
     lines = run.stderr.splitlines()
     assert len(lines) == len(paths), run.stderr
     for line, (case, path) in zip(lines, paths.items(), strict=True):

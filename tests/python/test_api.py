@@ -17,15 +17,14 @@ HEAVY = ("scipy", "mujoco", "typer", "rich", "matplotlib", "h5py", "dask", "plot
 
 def loaded_after(code: str) -> set[str]:
     script = f"import sys\n{code}\nprint(*sys.modules)"
-    run = ran(sys.executable, "-c", script)
-    names = run.stdout.split()
+    names = ran(sys.executable, "-c", script).stdout.split()
     return {*names, *(name.partition(".")[0] for name in names)}
 
 
 def test_import_loads_nothing_heavy() -> None:
-    assert "fclib" in loaded_after("import fclib")
-    assert loaded_after("import fclib").isdisjoint(HEAVY)
-    assert "fclib.external" not in loaded_after("import fclib")
+    loaded = loaded_after("import fclib")
+    assert "fclib" in loaded
+    assert loaded.isdisjoint({*HEAVY, "fclib.external"})
 
 
 def test_reading_and_solving_load_no_more_than_they_need(tmp_path: Path) -> None:

@@ -34,12 +34,12 @@ def test_a_stored_velocity_that_is_wrong_is_named(name: str) -> None:
     assert record["error"] > 0.5
     named = {one["part"]: one for one in record["mismatches"]}
     assert abs(named[part]["difference"]) == pytest.approx(size, rel=0.01)
-    assert f"{part}[{named[part]['index']}]" in invoke("check", path).output
+    assert f"{part}[{named[part]['index']}]" in invoke("check", path, code=1).output
 
 
 def test_a_grain_flung_up_is_not_ok() -> None:
     path = case("cx11_merit_small_grain.hdf5")
-    answer = invoke("check", path, "--json")
+    answer = invoke("check", path, "--json", code=1)
     record = json.loads(answer.stdout)
     assert record["status"] == "wrong"
     assert record["scaled_natural"] == pytest.approx(3.99, abs=0.02)

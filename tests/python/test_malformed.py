@@ -903,7 +903,7 @@ def test_no_link_into_another_file_is_followed(tmp_path: Path, name: str, soft: 
         if soft:
             file[name] = h5py.SoftLink("/away")
     copy = tmp_path / "copy.hdf5"
-    done = helpers_cli.run("convert", path, copy)
+    done = helpers_cli.run("convert", path, copy, code=None)
     assert "Traceback" not in done.stderr
     if done.returncode == 0:
         # what was linked is left out

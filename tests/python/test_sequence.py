@@ -686,8 +686,7 @@ def test_a_sequence_without_a_step_is_no_success(tmp_path: Path) -> None:
         'name = "empty"\nsolvers = ["auto"]\ntolerances = [1e-8]\n'
         f'[[problems]]\nfiles = ["{path}"]\n'
     )
-    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite")
-    assert done.returncode != 0
+    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite", code=1)
     assert "is a sequence in which there is no step" in " ".join(done.stderr.split())
 
 

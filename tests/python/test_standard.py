@@ -272,7 +272,8 @@ def test_a_proof_that_there_is_no_solution_is_taken(runs: Path, tmp_path: Path) 
     fclib.write(path, closing)
     proof.write_text(invoke("analyze", path, "--json").stdout)
     other = ("--problem", "existence/Squeezed/0001")
-    assert "was not run" in invoke("collection", "take", proof, "--by", "me", *other).output
+    done = invoke("collection", "take", proof, "--by", "me", *other, code=1)
+    assert "was not run" in done.output
     nothing = tmp_path / "nothing.json"
     for text in ('{"y": [1], "z": []}', "[" * 100_000):
         nothing.write_text(text)
@@ -322,7 +323,7 @@ def test_stored_proofs_prove() -> None:
 
 
 def test_status_tells_classes_and_what_they_rest_on(runs: Path, tmp_path: Path) -> None:
-    assert "no published run is of its" in invoke("collection", "status", "tiny").output
+    assert "no published run is of its" in invoke("collection", "status", "tiny", code=1).output
     store = tmp_path / "runs.sqlite"
     solvers = ("--solver", "nsgs", "--solver", "auto")
     files = set_index.DATA / "tiny"

@@ -247,11 +247,7 @@ def planted_local(
         }
     kind: Any = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
     problem = kind(
-        spacedim=d,
-        W=stored(W, storage, rng),
-        q=u.ravel() - W @ r.ravel() - V @ lam,
-        **law,
-        **mixed,
+        spacedim=d, W=stored(W, storage, rng), q=u.ravel() - W @ r.ravel() - V @ lam, **law, **mixed
     )
     solution = fclib.Solution(u=u.ravel(), r=r.ravel(), l=lam if p else None)
     return Planted(problem, solution, statuses)
@@ -404,11 +400,7 @@ def planted_spin(
     W = size[:, None] * (root @ root.T + 0.5 * np.eye(nc * d)) * size
     W = (W + W.T) / 2
     problem = fclib.LocalSpinProblem(
-        spacedim=d,
-        W=W,
-        q=u.ravel() - W @ r.ravel(),
-        coupled=int(law == "ellipsoid"),
-        **bounds,
+        spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), coupled=int(law == "ellipsoid"), **bounds
     )
     return problem, r.ravel()
 

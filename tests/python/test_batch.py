@@ -191,10 +191,7 @@ def islands(count: int, seed: int = 0) -> tuple[Any, Any, Any, Any]:
         W,
         rng.normal(size=(count, 18)),
         rng.uniform(0, 1, (count, 6)),
-        (
-            starts,
-            np.nonzero(near)[1],
-        ),
+        (starts, np.nonzero(near)[1]),
     )
 
 

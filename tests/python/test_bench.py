@@ -575,9 +575,7 @@ def test_what_is_spoilt_from_outside_is_tried_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("hasty")
-def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(
-    tmp_path: Path,
-) -> None:
+def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(tmp_path: Path) -> None:
     done: list[str] = []
     chosen = campaign(repeats=2)
     unlucky = chosen.plan()[3].key
@@ -598,10 +596,7 @@ def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(
         assert store.faults() == []
     # and those of a status that is named
     more = bench.run_campaign(
-        chosen,
-        tmp_path / "a.sqlite",
-        runner=fake(lambda *_: "converged", done),
-        retry=["stalled"],
+        chosen, tmp_path / "a.sqlite", runner=fake(lambda *_: "converged", done), retry=["stalled"]
     )
     assert (more.skipped, more.solved) == (1, 35)
 

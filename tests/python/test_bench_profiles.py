@@ -680,10 +680,7 @@ def test_two_merits_are_not_mixed(store: Path) -> None:
 
 def test_two_versions_of_a_solver_are_two_solvers(store: Path) -> None:
     fill(store, {"A": [1.0, 1.0, 1.0, 1.0]}, version="2.0")
-    assert {row["solver"] for row in profiles.load(store)} == {
-        *("A (1.0)", "A (2.0)"),
-        *("B", "C"),
-    }
+    assert {row["solver"] for row in profiles.load(store)} == {*("A (1.0)", "A (2.0)"), *("B", "C")}
 
 
 def test_a_version_is_told_only_where_it_tells_runs_apart(store: Path) -> None:

@@ -17,14 +17,7 @@ from hypothesis import strategies as st
 
 import capi_abi
 import fclib
-from capi_library import (
-    CAPI,
-    HEADERS,
-    ROOT,
-    compile_fortran,
-    compile_program,
-    library_folder,
-)
+from capi_library import CAPI, HEADERS, ROOT, compile_fortran, compile_program, library_folder
 from helpers import Array, dense, modified, planted_global, planted_local, project, ran
 from helpers_cli import invoke
 
@@ -337,11 +330,7 @@ def without_comments(header: str) -> str:
     return re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
 
 
-IN_FORTRAN = {
-    "int": "integer(c_int)",
-    "double": "real(c_double)",
-    "size_t": "integer(c_size_t)",
-}
+IN_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)", "size_t": "integer(c_size_t)"}
 
 
 def in_fortran(declaration: str) -> str:
@@ -691,8 +680,7 @@ def test_files_go_both_ways(
 
 
 @pytest.mark.parametrize(
-    "kind",
-    ["local", "global", "local_rolling", "global_rolling", "local_spin", "global_spin"],
+    "kind", ["local", "global", "local_rolling", "global_rolling", "local_spin", "global_spin"]
 )
 def test_files_come_back(
     kind: str, ours: Library, tmp_path_factory: pytest.TempPathFactory

@@ -206,8 +206,7 @@ def test_pages_in_a_browser(site: Path, browser: Any) -> None:
     page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
-        "request",
-        lambda r: None if r.url.startswith(("file:", "data:")) else wrong.append(r.url),
+        "request", lambda r: None if r.url.startswith(("file:", "data:")) else wrong.append(r.url)
     )
     page.set_viewport_size(PHONE)
     for path in sorted(site.rglob("*.html")):

@@ -132,11 +132,7 @@ def test_the_language_of_every_block_is_known() -> None:
     assert len(SHELL) > 8
 
 
-@pytest.mark.parametrize(
-    "block",
-    [b for bs in BLOCKS.values() for b in bs if b.reason],
-    ids=str,
-)
+@pytest.mark.parametrize("block", [b for bs in BLOCKS.values() for b in bs if b.reason], ids=str)
 def test_what_is_not_run_says_why(block: Block, root: Path) -> None:
     assert len(block.reason) > 10
     for name in re.findall(r"\btests/\S+\.py", block.reason):

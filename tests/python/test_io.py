@@ -73,11 +73,7 @@ def matrix_infos(draw: st.DrawFn, names: Sequence[str]) -> dict[str, fclib.Matri
 def local_problems(draw: st.DrawFn) -> fclib.LocalProblem:
     d, nc, p = draw(st.sampled_from([2, 3])), draw(st.integers(0, 4)), draw(st.integers(0, 3))
     m = d * nc
-    mixed = {
-        "V": draw_matrix(draw, m, p),
-        "R": draw_matrix(draw, p, p),
-        "s": draw_vector(draw, p),
-    }
+    mixed = {"V": draw_matrix(draw, m, p), "R": draw_matrix(draw, p, p), "s": draw_vector(draw, p)}
     return fclib.LocalProblem(
         spacedim=d,
         W=draw_matrix(draw, m, m),
@@ -332,12 +328,7 @@ def test_layout_of_a_global_file_is_triplets_rows_in_i(tmp_path: Path) -> None:
     path = tmp_path / "global.hdf5"
     H = np.array([[0.0, 2, 0], [0, 0, 5]])
     problem = fclib.GlobalProblem(
-        M=np.diag([1.0, 2]),
-        H=sp.csc_array(H),
-        f=np.ones(2),
-        w=np.zeros(3),
-        mu=[0.5],
-        info=INFO,
+        M=np.diag([1.0, 2]), H=sp.csc_array(H), f=np.ones(2), w=np.zeros(3), mu=[0.5], info=INFO
     )
     fclib.write(path, problem, fclib.Solution(v=np.ones(2), u=np.ones(3), r=np.zeros(3)))
     assert tree(path) == {

@@ -375,10 +375,7 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
     ),
     "numbers in another dataset": (store_elsewhere, f"{ROOT}/vectors/q: keeps"),
     "a huge q with a little in it": (declare_sparsely, f"{ROOT}/vectors/q: declares"),
-    "a size beyond all memory": (
-        declare(f"{ROOT}/W/x", "<f8", 2**60),
-        f"{ROOT}/W/x: declares",
-    ),
+    "a size beyond all memory": (declare(f"{ROOT}/W/x", "<f8", 2**60), f"{ROOT}/W/x: declares"),
     # declared, and written in part or not at all
     **{
         f"{name} never written": (
@@ -423,10 +420,7 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
         replace(f"{ROOT}/vectors/mu", h5py.ExternalLink("nothing.hdf5", "/mu")),
         f"{ROOT}/vectors/mu",
     ),
-    "a soft link to itself": (
-        replace(f"{ROOT}/W", h5py.SoftLink(f"/{ROOT}/W")),
-        f"{ROOT}/W",
-    ),
+    "a soft link to itself": (replace(f"{ROOT}/W", h5py.SoftLink(f"/{ROOT}/W")), f"{ROOT}/W"),
     "a soft link to the root": (replace(f"{ROOT}/W", h5py.SoftLink("/")), f"{ROOT}/W/m"),
     "a group that holds itself": (cycle, f"{ROOT}/W/x"),
     # the wrong kind of thing
@@ -441,10 +435,7 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
         f"a group in place of {name}": (make_group(f"{ROOT}/{name}"), f"{ROOT}/{name}")
         for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q")
     },
-    "a type in place of q": (
-        replace(f"{ROOT}/vectors/q", np.dtype("f8")),
-        f"{ROOT}/vectors/q",
-    ),
+    "a type in place of q": (replace(f"{ROOT}/vectors/q", np.dtype("f8")), f"{ROOT}/vectors/q"),
 }
 
 GLOBAL: dict[str, tuple[Spoil, str]] = {

@@ -77,8 +77,7 @@ def test_stiffness_is_that_of_quadrature(block: Block) -> None:
         values = np.where(corners, point, 1 - np.array(point))
         slopes = np.where(corners, 1.0, -1.0) / edges
         dN = np.stack(
-            [slopes[:, k] * np.prod(np.delete(values, k, axis=1), axis=1) for k in range(3)],
-            axis=1,
+            [slopes[:, k] * np.prod(np.delete(values, k, axis=1), axis=1) for k in range(3)], axis=1
         )
         K += np.einsum("ak,ikjl,bl->aibj", dN, C, dN).reshape(24, 24) * edges.prod() / 8
     found = stiffness(one, C).toarray()

@@ -1524,12 +1524,7 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
     ],
 )
 def test_a_step_that_cannot_be_recorded_is_left_out(
-    more: str,
-    text: str,
-    count: int,
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    more: str, text: str, count: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into a file there

@@ -15,24 +15,9 @@ from fclib.bench import profiles
 from fclib.collections import set_index, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers import planted_global
-from helpers_browser import (
-    DESK,
-    PHONE,
-    Opener,
-    check_accessible,
-    colours,
-    press_all,
-    served,
-    turn,
-)
+from helpers_browser import DESK, PHONE, Opener, check_accessible, colours, press_all, served, turn
 from helpers_cli import invoke
-from helpers_report import (
-    LABELS,
-    make_collection,
-    periodic_step,
-    read_data,
-    skip_without_libraries,
-)
+from helpers_report import LABELS, make_collection, periodic_step, read_data, skip_without_libraries
 from workshop.tables import report_size
 
 pytest.importorskip("mujoco")

@@ -86,9 +86,7 @@ def test_a_correction_may_solve(case: tuple[fclib.LocalProblem, Array]) -> None:
     assert fclib.solve(problem, "t-answers").converged
 
 
-def test_the_callback_is_told_what_the_history_says(
-    case: tuple[fclib.LocalProblem, Array],
-) -> None:
+def test_the_callback_is_told_what_the_history_says(case: tuple[fclib.LocalProblem, Array]) -> None:
     problem, r = case
     ANSWERS[:] = off_by(r, [1e-3, 1e-4, 1e-12])
     told: list[tuple[int, float, float, str]] = []

@@ -23,21 +23,10 @@ from helpers_simulate import mujoco_of
 mujoco = pytest.importorskip("mujoco")
 
 from fclib.collections import trajectory  # noqa: E402
-from fclib.simulate import (  # noqa: E402
-    MujocoModel,
-    StoppedError,
-    UnsupportedSceneError,
-    logged,
-    simulate,
-)
+from fclib.simulate import MujocoModel, StoppedError, UnsupportedSceneError, logged, simulate  # noqa: E402
 from fclib.simulate import simulation as module  # noqa: E402
 from fclib.simulate.geometry import places_of  # noqa: E402
-from fclib.simulate.simulation import (  # noqa: E402
-    STILL,
-    carry_over,
-    same_contacts,
-    trouble,
-)
+from fclib.simulate.simulation import STILL, carry_over, same_contacts, trouble  # noqa: E402
 
 H = 0.002  # s
 

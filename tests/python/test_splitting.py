@@ -11,14 +11,7 @@ from scipy import sparse
 import fclib
 from helpers import dense, local_problem, planted_local, planted_rolling
 
-LOCAL_SOLVERS = (
-    "exact",
-    "projection",
-    "diagonal",
-    "alart-curnier",
-    "fischer-burmeister",
-    "hybrid",
-)
+LOCAL_SOLVERS = ("exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister", "hybrid")
 PROJECTIONS = ("fp-ds", "fp-vi-upk", "fp-vi-upts", "fp-eg-upk", "fp-eg-upts", "hyperplane")
 METHODS = ("nsgs", "psor", *PROJECTIONS)
 SWEEPS: list[dict[str, Any]] = [

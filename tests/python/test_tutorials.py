@@ -29,10 +29,7 @@ def c_library(target: Path) -> dict[str, str]:
     for part in ("library", "development"):
         subprocess.run([*install, part], check=True, stdout=subprocess.DEVNULL)
     (found,) = target.rglob("fclib.pc")
-    return {
-        "PKG_CONFIG_PATH": str(found.parent),
-        "LD_LIBRARY_PATH": str(found.parent.parent),
-    }
+    return {"PKG_CONFIG_PATH": str(found.parent), "LD_LIBRARY_PATH": str(found.parent.parent)}
 
 
 @pytest.mark.parametrize("page", tutorials(), ids=lambda page: page.stem)

@@ -190,10 +190,7 @@ def test_a_triangle_that_stands_for_both(
         fclib.write(tmp_path / file, problem)
     pack(tmp_path / "packed.hdf5", name, storage, upper)
     again = getattr(fclib.read(tmp_path / "packed.hdf5"), name)
-    np.testing.assert_array_equal(
-        dense(again),
-        dense(symmetric),
-    )
+    np.testing.assert_array_equal(dense(again), dense(symmetric))
 
 
 def test_the_attribute_may_be_of_any_type(tmp_path: Path) -> None:

@@ -66,12 +66,7 @@ class NoRenderer(RuntimeError):  # noqa: N818
     """Neither EGL nor OSMesa works here."""
 
 
-def render(
-    source: Model | Step,
-    path: str | Path,
-    *,
-    size: tuple[int, int] | None = None,
-) -> None:
+def render(source: Model | Step, path: str | Path, *, size: tuple[int, int] | None = None) -> None:
     """Write a PNG of a step, or of the present state of a model, whole or not at all.
 
     source     a step is drawn in its state at the start, with the reactions of its solution;

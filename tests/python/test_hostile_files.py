@@ -155,9 +155,7 @@ def test_what_solvers_say_of_themselves_may_be_edited(tmp_path: Path) -> None:
         opened.db.execute("INSERT INTO certificates (run, certificate) VALUES (1, '[]')")
         opened.seal()
     for command in commands_on(store, tmp_path)[:-1]:
-        done = helpers_cli.run(*command, code=None)
-        assert "Traceback" not in done.stderr
-        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in helpers_cli.run(*command).stderr
 
 
 FOREIGN = {

@@ -44,8 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def said(*words: object, code: int = 0) -> str:
-    done = invoke(*words, code=code)
-    return done.output
+    return str(invoke(*words, code=code).output)
 
 
 def test_a_submission_is_judged_again(run: Path, tmp_path: Path) -> None:

@@ -364,8 +364,7 @@ def test_the_commands(tmp_path: Path) -> None:
     parts = tmp_path / "parts"
 
     def said(*words: object, code: int = 0) -> str:
-        done = invoke(*words, code=code)
-        return done.output
+        return str(invoke(*words, code=code).output)
 
     options = ("--name", "small", "--in", parts, "--machine", "fast")
     part = said("results", "pack", tmp_path / "theirs.sqlite", *options).strip()

@@ -277,7 +277,7 @@ def test_a_proof_that_there_is_no_solution_is_taken(runs: Path, tmp_path: Path) 
         done = invoke("collection", "take", nothing, "--by", "me", "--problem", name, code=1)
         assert "nothing.json" in done.output or "proves nothing" in done.output
     nothing.write_text('{"y": [1], "z": []}')
-    assert "name the problem" in invoke("collection", "take", nothing, "--by", "me").output
+    assert "name the problem" in invoke("collection", "take", nothing, "--by", "me", code=1).output
     done = invoke("collection", "take", proof, "--by", "me", "--problem", name)
     (row,) = [row for row in ratings.ratings_of("existence")[0] if row.id == name]
     assert (row.rating, row.solved, row.voters) == ("hard", 0, 2)

@@ -479,7 +479,14 @@ def dense(a: Any) -> Array:
     return np.asarray(a.toarray() if sp.issparse(a) else a, dtype=float)
 
 
-# ---- programs
+# ---- solves and programs
+
+
+def converged(*arguments: Any, **options: Any) -> fclib.Result:
+    """What `fclib.solve` returns, which must be a solution."""
+    result = fclib.solve(*arguments, **options)
+    assert (result.status, result.converged) == ("converged", True), result.error
+    return result
 
 
 def ran(

@@ -18,7 +18,7 @@ from fclib.collections import set_index
 from fclib.scenes import Assembled
 from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
-from helpers import ran
+from helpers import converged, ran
 
 FAMILIES: dict[str, Any] = dict(scenes.assemblies())
 ALL: dict[str, Any] = FAMILIES | dict(scenes.families())
@@ -56,8 +56,7 @@ def blocks(name: str, number: int, **parameters: Any) -> Any:
 
 
 def solved(problem: Any) -> Any:
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     return result.solution
 
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 import fclib
 from ball_judge import judge
 from fclib import analysis
-from helpers import dense, last_resort, ring
+from helpers import converged, dense, last_resort, ring
 from helpers_cli import run
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
@@ -64,8 +64,7 @@ def test_what_has_a_solution_is_not_called_infeasible(path: Path) -> None:
     problem = fclib.read(path)
     # of cx09 the last digit of the reactions is worth 6e-7
     tolerance = 1e-7 if path.name.startswith("cx09") else 1e-8
-    result = fclib.solve(problem, tol=tolerance)
-    assert result.status == "converged"
+    result = converged(problem, tol=tolerance)
     if not path.name.startswith("cx07"):  # what its large multipliers round is taken off there
         assert judge(problem, result.solution).error <= tolerance
     assert analysis.analyze(problem, time_limit=5).existence.verdict != analysis.PROVEN_NOT
@@ -212,8 +211,7 @@ def test_a_packed_triangle_is_the_whole(path: Path) -> None:
         p, i, x = (group[name][:] for name in ("p", "i", "x"))
     lower = sp.csc_array((x, i, p), shape=(6, 6)).toarray()
     np.testing.assert_array_equal(W, lower + lower.T - np.diag(np.diag(lower)))
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert judge(problem, result.solution).error <= 1e-8
 
 
@@ -221,8 +219,7 @@ def test_a_packed_triangle_is_the_whole(path: Path) -> None:
 def test_what_other_programs_write_is_read(path: Path) -> None:
     problem = fclib.read(path)
     assert problem.nc == 2
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert judge(problem, result.solution).error <= 1e-8
     title = {"text_as_uint8": "bytes as numbers"}.get(path.stem, "")
     assert problem.info.title == title

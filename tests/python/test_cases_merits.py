@@ -8,7 +8,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import Array, bodies, case, dense, planted_global, planted_local
+from helpers import Array, bodies, case, converged, dense, planted_global, planted_local
 from helpers_cli import invoke
 
 TOLERANCE = 1e-8
@@ -52,8 +52,7 @@ def test_small_masses_are_solved_in_both_merits() -> None:
     merit = fclib.merit(problem, result.solution)
     assert (result.status == "converged") == (max(merit.natural, merit.scaled_natural) <= TOLERANCE)
     assert result.status == "converged"
-    natural = fclib.solve(problem, tol=TOLERANCE, merit="natural")
-    assert natural.status == "converged"
+    natural = converged(problem, tol=TOLERANCE, merit="natural")
     assert fclib.merit(problem, natural.solution).error_by("natural") <= TOLERANCE
 
 
@@ -118,8 +117,7 @@ def test_no_friction_hides_a_penetration(mu: float, rolling: bool) -> None:
     q[:2] = -1.0, 1.0
     problem = kind(spacedim=d, W=np.eye(d), q=q, mu=[mu], **law)
     assert fclib.merit(problem, np.zeros(d)).scaled_natural > 0.5
-    result = fclib.solve(problem, tol=TOLERANCE)
-    assert result.converged
+    result = converged(problem, tol=TOLERANCE)
     assert np.asarray(result.solution.u)[0] > -1e-6
 
 
@@ -220,8 +218,7 @@ def test_a_problem_with_nothing_to_do_is_solved(solver: str) -> None:
         problem = tree_in_flight(seed)
         assert np.linalg.norm(problem.condense().q) < 1e-12
         for tol in (1e-4, 1e-8, 1e-12):
-            result = fclib.solve(problem, solver, tol)
-            assert result.status == "converged"
+            result = converged(problem, solver, tol)
             assert fclib.merit(problem, result.solution).error <= tol
             assert np.linalg.norm(result.solution.r) < 1e-9
 
@@ -233,8 +230,7 @@ def test_more_than_rounding_is_to_be_done() -> None:
     w[0] = -1e-9
     problem = problem.replace(w=w)
     assert fclib.merit(problem, fclib.Solution(r=np.zeros(problem.m))).natural > 0.5
-    result = fclib.solve(problem, tol=1e-4)
-    assert result.status == "converged"
+    result = converged(problem, tol=1e-4)
     assert result.solution.r[0] > 0
 
 
@@ -262,8 +258,7 @@ def test_the_tolerance_holds_in_any_units(impulse: float) -> None:
 
 def test_the_natural_map_alone_may_be_asked_for() -> None:
     problem = bodies(1, nc=6).scaled(impulse=1e-9)
-    alone = fclib.solve(problem, tol=TOLERANCE, merit="natural")
-    assert alone.status == "converged"
+    alone = converged(problem, tol=TOLERANCE, merit="natural")
     assert alone.error == fclib.merit(problem, alone.solution).error_by("natural")
     both = fclib.solve(problem, tol=TOLERANCE)
     assert both.error == fclib.merit(problem, both.solution).error

@@ -24,7 +24,7 @@ from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
 from fclib.bench.fingerprint import version_of
 from fclib.external import command, siconos
-from helpers import local_problem, planted_global, planted_local, planted_rolling, ran
+from helpers import converged, local_problem, planted_global, planted_local, planted_rolling, ran
 from helpers_cli import run
 
 DOCS = "docs/solvers-of-your-own.md"
@@ -342,8 +342,7 @@ def test_a_program_solves(tmp_path: Path) -> None:
         """,
     )
     for case in (planted_local(1, nc=3), planted_global(2, d=2, nc=3, p=2)):
-        result = fclib.solve(case.problem, solver, tol=1e-8, history=True)
-        assert result.status == "converged"
+        result = converged(case.problem, solver, tol=1e-8, history=True)
         assert result.solver == solver
         assert result.error <= 1e-8
         assert result.cpu_s > 0.01
@@ -470,10 +469,8 @@ def test_the_program_in_c(root: Path, tmp_path: Path, d: int) -> None:
     solver = compile_program(root / "examples" / "c" / "pgs.c", tmp_path / "pgs", "-lm")
     for case in (planted_local(3, d=d, nc=5), planted_global(4, d=d, nc=3, p=2)):
         name = f"cmd:{solver} {{input}} {{tol}}"
-        result = fclib.solve(case.problem, name, 1e-8, time_limit=20)
-        assert result.status == "converged"
-        guessed = fclib.solve(case.problem, name, 1e-8, guess=fclib.Solution(r=result.solution.r))
-        assert guessed.converged
+        result = converged(case.problem, name, 1e-8, time_limit=20)
+        converged(case.problem, name, 1e-8, guess=fclib.Solution(r=result.solution.r))
 
 
 # ---- other packages
@@ -507,8 +504,7 @@ def test_external_solvers_solve_what_is_easy(name: str) -> None:
             continue
         assert slides.converged
         for case in (planted_local(3, d=d, nc=10), planted_global(3, d=d, nc=5, p=2)):
-            result = fclib.solve(case.problem, name, 1e-7, time_limit=20)
-            assert result.status == "converged"
+            result = converged(case.problem, name, 1e-7, time_limit=20)
             assert result.error == fclib.merit(case.problem, result.solution).error
             assert result.cpu_s > 0
             guessed = fclib.solve(case.problem, name, 1e-5, guess=result.solution)
@@ -713,8 +709,7 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
         def hear(iteration: int, error: float, seconds: float, stage: str, to: Any = seen) -> None:
             to.append(error)
 
-        result = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", callback=hear)
-        assert result.status == "converged"
+        result = converged(problem, f"plugin:{shared_objects}/lib{name}.so", callback=hear)
         assert fclib.merit(problem, result.solution).error <= 1e-8
         assert len(seen) == result.iterations + 1 > 1
     limited = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", tol=0, max_iterations=3)
@@ -772,8 +767,7 @@ def test_a_shared_object_has_options(shared_objects: Path) -> None:
 def test_a_shared_object_solves_rolling_problems(shared_objects: Path, d: int) -> None:
     problem, _ = planted_rolling(d, 3, nc=4)
     name = f"plugin:{shared_objects}/libpgs.so"
-    result = fclib.solve(problem, name, step=0.4)
-    assert result.status == "converged"
+    result = converged(problem, name, step=0.4)
     assert fclib.merit(problem, result.solution).error <= 1e-8
     assert fclib.solve(problem, name, step=0.2).iterations > result.iterations
 

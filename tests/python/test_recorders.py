@@ -19,7 +19,7 @@ import pytest
 import fclib
 from fclib import recorders
 from fclib.recorders import _genesis, _newton
-from helpers import dense, needs_siconos_mechanics
+from helpers import converged, dense, needs_siconos_mechanics
 from helpers_cli import invoke
 
 H = 1e-3
@@ -28,8 +28,7 @@ FRAME = np.eye(3)[[2, 0, 1]]  # N is up
 
 
 def solved(made: recorders.Assembled) -> Any:
-    result = fclib.solve(made.problem, tol=1e-10)
-    assert result.converged
+    result = converged(made.problem, tol=1e-10)
     return result.solution
 
 
@@ -1358,8 +1357,7 @@ def test_the_moment_that_brakes_a_top_is_recorded(
     assert step.guess is not None
     r = step.guess.r[:d]
     assert r[0] == pytest.approx(2 * 9.81 * 0.002, rel=1e-3)
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     assert result.solution.r[0] == pytest.approx(r[0], rel=1e-3)
     if kind == "global_spin":
         assert problem.mu_s[0] == 0.02

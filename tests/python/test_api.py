@@ -34,6 +34,13 @@ def test_reading_and_solving_load_no_more_than_they_need(tmp_path: Path) -> None
     assert loaded_after(code).isdisjoint(HEAVY)
 
 
+def test_a_build_begins_without_what_few_of_them_need() -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("pyarrow")
+    code = "import fclib.simulate\nfrom fclib.collections import ratings\nratings.runs()"
+    assert loaded_after(code).isdisjoint(("pandas", "scipy.spatial"))
+
+
 def test_all_is_complete_and_sorted() -> None:
     public = {
         name

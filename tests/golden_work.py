@@ -273,12 +273,7 @@ def row(name: str, solver: str, problem: Any, guess: fclib.Solution | None) -> R
     for _ in range(TRIES):
         start = time.monotonic()
         result = fclib.solve(
-            problem,
-            solver,
-            TOLERANCE,
-            max_iterations=ITERATIONS,
-            guess=guess,
-            merit="natural",
+            problem, solver, TOLERANCE, max_iterations=ITERATIONS, guess=guess, merit="natural"
         )
         word = "" if time.monotonic() - start < POLL else CLOCK
         if not word:

@@ -247,11 +247,7 @@ def planted_local(
         }
     kind: Any = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
     problem = kind(
-        spacedim=d,
-        W=stored(W, storage, rng),
-        q=u.ravel() - W @ r.ravel() - V @ lam,
-        **law,
-        **mixed,
+        spacedim=d, W=stored(W, storage, rng), q=u.ravel() - W @ r.ravel() - V @ lam, **law, **mixed
     )
     solution = fclib.Solution(u=u.ravel(), r=r.ravel(), l=lam if p else None)
     return Planted(problem, solution, statuses)
@@ -404,11 +400,7 @@ def planted_spin(
     W = size[:, None] * (root @ root.T + 0.5 * np.eye(nc * d)) * size
     W = (W + W.T) / 2
     problem = fclib.LocalSpinProblem(
-        spacedim=d,
-        W=W,
-        q=u.ravel() - W @ r.ravel(),
-        coupled=int(law == "ellipsoid"),
-        **bounds,
+        spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), coupled=int(law == "ellipsoid"), **bounds
     )
     return problem, r.ravel()
 
@@ -485,3 +477,22 @@ def git(*words: str) -> str:
 def dense(a: Any) -> Array:
     """Any matrix as a dense array."""
     return np.asarray(a.toarray() if sp.issparse(a) else a, dtype=float)
+
+
+# ---- solves and programs
+
+
+def converged(*arguments: Any, **options: Any) -> fclib.Result:
+    """What `fclib.solve` returns, which must be a solution."""
+    result = fclib.solve(*arguments, **options)
+    assert (result.status, result.converged) == ("converged", True), result.error
+    return result
+
+
+def ran(
+    *command: object, code: int | None = 0, **settings: Any
+) -> subprocess.CompletedProcess[str]:
+    """A program that has ended with this code, or with any, and what it said."""
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, **settings)
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done

@@ -22,10 +22,13 @@ class Pipe(TextIOWrapper):
         super().__init__(self.bytes, "utf-8", errors, write_through=True)
 
 
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """A command in this process: another one takes half a second to start, and tests no more."""
+def run(*arguments: object, code: int | None = 0) -> subprocess.CompletedProcess[str]:
+    """A command that ends with this code, or with any, in the process of the tests.
+
+    Another process takes half a second to start, and tests no more.
+    """
     command = ["fclib", *map(str, arguments)]
-    code: Any = 0
+    ended: Any = 0
     with (
         redirect_stdout(Pipe("strict")) as out,
         redirect_stderr(Pipe("backslashreplace")) as err,
@@ -34,22 +37,23 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         try:
             cli.main()
         except SystemExit as end:
-            code = end.code or 0
-    said = (stream.bytes.getvalue().decode() for stream in (out, err))
-    return subprocess.CompletedProcess(command, code, *said)
+            ended = end.code or 0
+    said = [stream.bytes.getvalue().decode() for stream in (out, err)]
+    assert code in (None, ended), "".join(said)
+    return subprocess.CompletedProcess(command, ended, *said)
 
 
 def tables(store: Path, *arguments: str) -> dict[str, list[dict[str, Any]]]:
     """What `fclib profile --json` prints, by table."""
-    done = run("profile", store, "--json", *arguments)
-    assert done.returncode == 0, done.stderr
     found: dict[str, list[dict[str, Any]]] = {}
-    for line in done.stdout.splitlines():
+    for line in run("profile", store, "--json", *arguments).stdout.splitlines():
         record = json.loads(line)
         found.setdefault(record.pop("table"), []).append(record)
     return found
 
 
-def invoke(*arguments: object) -> Any:
-    """A command, and its output as one text in which both streams are."""
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+def invoke(*arguments: object, code: int | None = 0) -> Any:
+    """A command that ends so; its output is one text in which both streams are."""
+    done = CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+    assert code in (None, done.exit_code), f"{done.output}\n{done.exception!r}"
+    return done

@@ -328,14 +328,7 @@ def held(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     impulse = r.ravel()
     v = (H @ impulse + G @ lam + f) / mass
     problem: Any = fclib.GlobalProblem(
-        spacedim=d,
-        M=np.diag(mass),
-        H=H,
-        f=f,
-        w=u.ravel() - H.T @ v,
-        mu=law["mu"],
-        G=G,
-        b=-G.T @ v,
+        spacedim=d, M=np.diag(mass), H=H, f=f, w=u.ravel() - H.T @ v, mu=law["mu"], G=G, b=-G.T @ v
     )
     solution = fclib.Solution(v=v, u=u.ravel(), r=impulse, l=lam)
     if rng.integers(2):

@@ -25,8 +25,8 @@
 #include "methods/relaxation.hpp"
 #include "methods/shared_options.hpp"
 #include "reduced/de_saxce_shift.hpp"
-#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/by_cone.hpp"
 
 namespace fclib::aclm {
 
@@ -129,13 +129,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   return best.outcome(r);
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -149,7 +142,7 @@ const Solver& solver() {
       .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

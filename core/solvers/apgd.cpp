@@ -21,8 +21,8 @@
 #include "reduced/convex_residual.hpp"
 #include "reduced/convex_sets.hpp"
 #include "reduced/de_saxce_shift.hpp"
-#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/by_cone.hpp"
 
 namespace fclib::apgd {
 
@@ -78,13 +78,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   }
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -98,7 +91,7 @@ const Solver& solver() {
       .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

@@ -5,10 +5,9 @@
 // the last digits.
 
 #include "methods/homotopy.hpp"
-
 #include "methods/proximal_point.hpp"
 #include "reduced/relative_error.hpp"
-#include "reduced/with_cone.hpp"
+#include "solve/by_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::homotopy {
@@ -75,13 +74,6 @@ Outcome iterate(const ReducedProblem& problem, Options options, const Settings& 
   return {stopped.value_or(Status::stalled), iterations};
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -95,7 +87,7 @@ const Solver& solver() {
       .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 100000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

@@ -23,8 +23,8 @@
 #include "methods/product_interior_point.hpp"
 #include "methods/shared_options.hpp"
 #include "reduced/gauss_seidel.hpp"
-#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/by_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::nsip {
@@ -73,13 +73,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   return best.outcome(r);
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -94,7 +87,7 @@ const Solver& solver() {
       .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 1000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

@@ -18,8 +18,8 @@
 #include <cstdint>
 
 #include "methods/convex_program.hpp"
-#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/by_cone.hpp"
 
 namespace fclib::panagiotopoulos {
 
@@ -82,13 +82,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   return best.outcome(r);
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -101,7 +94,7 @@ const Solver& solver() {
       .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

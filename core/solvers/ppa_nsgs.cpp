@@ -23,7 +23,7 @@
 #include "methods/shared_options.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
-#include "reduced/with_cone.hpp"
+#include "solve/by_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsgs {
@@ -167,13 +167,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   }
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -186,7 +179,7 @@ const Solver& solver() {
       .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

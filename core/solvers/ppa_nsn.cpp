@@ -18,7 +18,7 @@
 #include "methods/proximal_point.hpp"
 #include "methods/shared_options.hpp"
 #include "reduced/relative_error.hpp"
-#include "reduced/with_cone.hpp"
+#include "solve/by_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsn {
@@ -76,13 +76,6 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   return {stopped.value_or(Status::stalled), iterations};
 }
 
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
-}
-
 }  // namespace
 
 const Solver& solver() {
@@ -96,7 +89,7 @@ const Solver& solver() {
       .spin_dimensions = {4, 6},
       .options = describe_options<Options>(),
       .max_iterations = 10'000,
-      .solve = solve,
+      .solve = by_cone<Options>([]<class Cone>(auto&... all) { return iterate<Cone>(all...); }),
   };
   return entry;
 }

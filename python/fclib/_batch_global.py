@@ -7,15 +7,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
-from fclib._batch import (
-    BatchResult,
-    Law,
-    check_contacts,
-    flat,
-    floats,
-    run,
-    shaped,
-)
+from fclib._batch import BatchResult, Law, check_contacts, flat, floats, run, shaped
 from fclib._solve import check_limits
 
 

@@ -276,11 +276,7 @@ class _Point:
                 "law": slice(n, n + m),
                 "joints": slice(n + m, n + m + p),
             }
-            self.parts = {
-                "v": slice(0, n),
-                "r": slice(n, n + m),
-                "l": slice(n + m, n + m + p),
-            }
+            self.parts = {"v": slice(0, n), "r": slice(n, n + m), "l": slice(n + m, n + m + p)}
 
     def _law(self, diagonal: Array) -> None:
         """by_u du + by_r dr = sum of by_friction[c] dc over the coefficients c, by contacts."""

@@ -63,9 +63,7 @@ class DeviceBatchResult:
     offsets: DeviceArray | None
     by_auto: int
 
-    statuses: ClassVar[tuple[str, ...]] = tuple(
-        dict.fromkeys((*_core.status_names(), "invalid")),
-    )
+    statuses: ClassVar[tuple[str, ...]] = tuple(dict.fromkeys((*_core.status_names(), "invalid")))
 
     def __len__(self) -> int:
         return len(self.status)

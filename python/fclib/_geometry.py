@@ -9,7 +9,7 @@ the unit that the bodies name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
@@ -25,16 +25,18 @@ Numbers = npt.NDArray[np.float64]
 KINDS: Final = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
 
-def column(
-    count: str, width: int, kind: Any, doc: str, *, optional: bool = False
-) -> dict[str, Any]:
+def column(count: str, width: int, kind: Any, doc: str) -> dict[str, Any]:
     """The description of a field: `count` rows of `width` numbers each; kind: int, float or str."""
-    return {"count": count, "width": width, "kind": kind, "doc": doc, "optional": optional}
+    return {"count": count, "width": width, "kind": kind, "doc": doc, "optional": False}
 
 
-def nothing(kind: Any, width: int = 1) -> Callable[[], Any]:
-    """The default factory of an absent column."""
-    return lambda: np.zeros((0, width) if width > 1 else 0, _type(kind))
+def optional(count: str, width: int, kind: Any, doc: str) -> Any:
+    """A field that is empty where its column is absent."""
+    metadata = column(count, width, kind, doc) | {"optional": True}
+    if kind is str:
+        return field(default="", metadata=metadata)
+    shape = (0, width) if width > 1 else 0
+    return field(default_factory=lambda: np.zeros(shape, _type(kind)), metadata=metadata)
 
 
 def _type(kind: Any) -> Any:
@@ -51,7 +53,7 @@ class _Table:
         for own in fields(cls):  # type: ignore[arg-type]
             known = own.metadata
             if own.name not in columns:
-                if known.get("optional"):
+                if known["optional"]:
                     continue
                 raise ValueError(f"/{group}/{own.name}: the dataset is missing")
             value = columns[own.name]
@@ -78,9 +80,9 @@ class _Table:
             if own.metadata["kind"] is not str:
                 value = np.ascontiguousarray(value, dtype=_type(own.metadata["kind"])).ravel()
                 # without contacts /contacts/gap is still written, but optional columns are not
-                if own.metadata.get("optional") and not value.size:
+                if own.metadata["optional"] and not value.size:
                     continue
-            elif own.metadata.get("optional") and not value:
+            elif own.metadata["optional"] and not value:
                 continue
             found[own.name] = value
         return found
@@ -89,7 +91,7 @@ class _Table:
         for own in fields(self):  # type: ignore[arg-type]
             known = own.metadata
             value = getattr(self, own.name)
-            if known["kind"] is str or (known.get("optional") and not len(value)):
+            if known["kind"] is str or (known["optional"] and not len(value)):
                 continue
             if known["count"] in counts and len(value) != counts[known["count"]]:
                 raise ValueError(
@@ -173,86 +175,32 @@ class Bodies(_Table):
     shape_place: Numbers = field(metadata=column("ns", 3, float, "in the body"))
     shape_turn: Numbers = field(metadata=column("ns", 4, float, "in the body"))
     shape_mesh: Integers = field(metadata=column("ns", 1, int, "its mesh, -1 for another kind"))
-    mesh_first: Integers = field(
-        default_factory=nothing(int, 2),
-        metadata=column(
-            "nm + 1",
-            2,
-            int,
-            "the first vertex and the first face of each mesh, and their numbers",
-            optional=True,
-        ),
+    mesh_first: Integers = optional(
+        "nm + 1", 2, int, "the first vertex and the first face of each mesh, and their numbers"
     )
-    vertex: Numbers = field(
-        default_factory=nothing(float, 3),
-        metadata=column("", 3, float, "of all meshes, in the shape", optional=True),
+    vertex: Numbers = optional("", 3, float, "of all meshes, in the shape")
+    displacement: Numbers = optional(
+        "", 3, float, "of an elastic body's vertices since it was without stress"
     )
-    displacement: Numbers = field(
-        default_factory=nothing(float, 3),
-        metadata=column(
-            "", 3, float, "of an elastic body's vertices since it was without stress", optional=True
-        ),
+    face: Integers = optional(
+        "", 4, int, "vertices of a face of its mesh about the outward normal; -1: three only"
     )
-    face: Integers = field(
-        default_factory=nothing(int, 4),
-        metadata=column(
-            "",
-            4,
-            int,
-            "vertices of a face of its mesh about the outward normal; -1: three only",
-            optional=True,
-        ),
+    period: Numbers = optional(
+        "2", 1, float, "edges of a cell about the origin that repeats along x and y"
     )
-    period: Numbers = field(
-        default_factory=nothing(float),
-        metadata=column(
-            "2",
-            1,
-            float,
-            "edges of a cell about the origin that repeats along x and y",
-            optional=True,
-        ),
+    planar: Integers = optional("1", 1, int, "1 if all moves in the plane x, z; else absent")
+    mass: Numbers = optional("nb", 1, float, "of each rigid body; 0 of a fixed one")
+    inertia: Numbers = optional(
+        "nb", 3, float, "principal moments of each rigid body, about its centre"
     )
-    planar: Integers = field(
-        default_factory=nothing(int),
-        metadata=column(
-            "1", 1, int, "1 if all moves in the plane x, z; else absent", optional=True
-        ),
+    center: Numbers = optional("nb", 3, float, "centre of mass, in the body")
+    axes: Numbers = optional("nb", 4, float, "of the principal axes, in the body")
+    velocity: Numbers = optional("n", 1, float, "v0, generalised, at the start of the step")
+    impulse: Numbers = optional(
+        "n", 1, float, "of all known forces during the step: f = M v0 + impulse"
     )
-    mass: Numbers = field(
-        default_factory=nothing(float),
-        metadata=column("nb", 1, float, "of each rigid body; 0 of a fixed one", optional=True),
-    )
-    inertia: Numbers = field(
-        default_factory=nothing(float, 3),
-        metadata=column(
-            "nb", 3, float, "principal moments of each rigid body, about its centre", optional=True
-        ),
-    )
-    center: Numbers = field(
-        default_factory=nothing(float, 3),
-        metadata=column("nb", 3, float, "centre of mass, in the body", optional=True),
-    )
-    axes: Numbers = field(
-        default_factory=nothing(float, 4),
-        metadata=column("nb", 4, float, "of the principal axes, in the body", optional=True),
-    )
-    velocity: Numbers = field(
-        default_factory=nothing(float),
-        metadata=column("n", 1, float, "v0, generalised, at the start of the step", optional=True),
-    )
-    impulse: Numbers = field(
-        default_factory=nothing(float),
-        metadata=column(
-            "n", 1, float, "of all known forces during the step: f = M v0 + impulse", optional=True
-        ),
-    )
-    unit: str = field(
-        default="", metadata=column("1", 1, str, "of lengths; absent if it is m", optional=True)
-    )
-    mass_unit: str = field(
-        default="", metadata=column("1", 1, str, "of masses; absent if it is kg", optional=True)
-    )
+    unit: str = optional("1", 1, str, "of lengths; absent if it is m")
+    mass_unit: str = optional("1", 1, str, "of masses; absent if it is kg")
 
     def __post_init__(self) -> None:
         """Raises ValueError if the columns contradict each other."""

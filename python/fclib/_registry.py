@@ -131,11 +131,7 @@ def dimensions_of(info: _core.SolverInfo, kind: str) -> list[int]:
 
 def dimensions_by_law(info: _core.SolverInfo) -> dict[str, list[int]]:
     """The spacedims that a solver takes, by the law of the contacts."""
-    return {
-        "": info.dimensions,
-        "rolling": info.rolling_dimensions,
-        "spin": info.spin_dimensions,
-    }
+    return {"": info.dimensions, "rolling": info.rolling_dimensions, "spin": info.spin_dimensions}
 
 
 def make_solver(

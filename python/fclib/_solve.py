@@ -191,11 +191,7 @@ def _run(
 
 
 def check_limits(
-    tol: float,
-    time_limit: float | None,
-    *,
-    max_iterations: int | None = None,
-    threads: int = 0,
+    tol: float, time_limit: float | None, *, max_iterations: int | None = None, threads: int = 0
 ) -> None:
     """OptionError if one is out of range, or no number."""
     try:

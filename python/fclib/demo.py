@@ -16,10 +16,7 @@ from fclib import bench
 from fclib._files import write_csv
 
 # solvers with their options
-CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("auto", {}),
-    ("nsgs", {}),
-)
+CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (("auto", {}), ("nsgs", {}))
 CAMPAIGN = "quick"
 
 

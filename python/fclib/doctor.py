@@ -106,10 +106,7 @@ def requirements() -> list[Requirement]:
         applies = bound is None or newer == (bound[1] == ">=")
         before = merged.get(named[1])
         merged[named[1]] = Requirement(
-            named[1],
-            named[2].strip(),
-            (*(before.extras if before else ()), *extras),
-            applies,
+            named[1], named[2].strip(), (*(before.extras if before else ()), *extras), applies
         )
     return list(merged.values())
 

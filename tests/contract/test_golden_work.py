@@ -19,10 +19,7 @@ FREE = replace(EXACT, may_differ="free")
 def test_the_work_is_that_of_the_table() -> None:
     found = golden_work.differences(golden_work.read(), golden_work.runs())
     assert not found, "\n".join(
-        [
-            "if this is meant, make the table anew: python tests/golden_work.py --write",
-            *found,
-        ]
+        ["if this is meant, make the table anew: python tests/golden_work.py --write", *found]
     )
 
 

@@ -14,7 +14,7 @@ import pytest
 import fclib
 from ball_judge import judge
 from fclib import _core
-from helpers import dense, local_problem, planted_global, planted_law
+from helpers import converged, dense, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from planted_judge import REGIMES, claim, verdict
@@ -112,8 +112,7 @@ def test_a_guess_where_nothing_moves_does_not_round_the_others(d: int, rolling: 
     problem = problem.replace(W=W, q=q)
     guess = fclib.Solution(r=1e12 * np.abs(np.random.default_rng(1).standard_normal(problem.m)))
     for solver in ("auto", "nsgs"):
-        result = fclib.solve(problem, solver, guess=guess)
-        assert result.status == "converged"
+        result = converged(problem, solver, guess=guess)
         assert not result.solution.r[still].any()
         assert judge(problem, result.solution).error <= 1e-8
 
@@ -135,8 +134,7 @@ def test_a_pebble_that_rolls_under_a_heavy_body_is_solved(heavy: float, tol: flo
         mu=[0.6, 0.6],
         mu_r=[1e-4, 1e-4],
     )
-    result = fclib.solve(problem, tol=tol)
-    assert result.status == "converged"
+    result = converged(problem, tol=tol)
     assert judge(problem, result.solution).error <= tol
 
 
@@ -144,8 +142,7 @@ def test_a_pebble_that_rolls_under_a_heavy_body_is_solved(heavy: float, tol: flo
 def test_units_of_mass_do_not_matter(mass: float) -> None:
     for seed in range(5):
         problem = of_rank(2, 3, False, seed)
-        result = fclib.solve(problem.replace(W=problem.W / mass))
-        assert result.status == "converged"
+        converged(problem.replace(W=problem.W / mass))
 
 
 def test_planted_problems_of_every_formulation_get_no_false_word() -> None:

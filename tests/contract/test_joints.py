@@ -12,7 +12,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import dense, planted_global, planted_local
+from helpers import converged, dense, planted_global, planted_local
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -132,8 +132,7 @@ def test_constraints_of_many_loops_are_solved() -> None:
         spacedim=d, M=np.eye(n), H=H, f=rng.standard_normal(n), w=np.zeros(d * 5),
         mu=np.full(5, 0.5), G=G, b=np.zeros(80),
     )  # fmt: skip
-    result = fclib.solve(problem)
-    assert result.status == "converged"
+    result = converged(problem)
     assert judge(problem, result.solution).error <= 1e-8
     lam = result.solution.l
     assert lam is not None
@@ -217,8 +216,7 @@ def test_a_contradiction_is_refused_where_the_tolerance_does_not_allow_it() -> N
         problem: Any = planted_global(seed, p=2).problem
         G = dense(problem.G)
         twice = problem.replace(G=np.hstack([G, G]), b=np.array([0.0, 0.0, off, -off]))
-        result = fclib.solve(twice, tol=1e-4)
-        assert result.converged
+        result = converged(twice, tol=1e-4)
         v = result.solution.v
         assert v is not None
         left = np.abs(dense(twice.G).T @ v + twice.b)
@@ -343,8 +341,7 @@ def test_a_true_contradiction_in_single_precision_stays_refused() -> None:
         stated = loop_in_single_precision(seed, 1e-8, np.float64).replace(
             info=fclib.ProblemInfo(description='Rounded.\n{"precision": 6e-08}')
         )
-        result = fclib.solve(stated)
-        assert result.converged
+        result = converged(stated)
         assert "stated precision" in result.message
 
 
@@ -363,8 +360,7 @@ def test_numbers_of_few_bits_are_meant_exactly() -> None:
 def test_the_local_form_of_a_loop_in_single_precision_is_consistent() -> None:
     problem = loop_in_single_precision(0)
     local = problem.condense()
-    result = fclib.solve(local)
-    assert result.converged
+    result = converged(local)
     assert judge(local, result.solution).error <= 1e-8
     whole = fclib.solve(problem).solution
     assert result.solution.r == pytest.approx(whole.r, rel=1e-6, abs=1e-9)
@@ -379,8 +375,7 @@ def test_a_recorded_loop_in_single_precision_is_solved() -> None:
     assert isinstance(problem, fclib.GlobalProblem)
     assert problem.b is not None
     for solver in SOLVERS:
-        result = fclib.solve(problem, solver=solver)
-        assert result.converged
+        result = converged(problem, solver=solver)
         assert "1.1e-07 m/s" in result.message
         assert judge(agreeing(problem, 17), result.solution).error <= 2e-8
         v = result.solution.v

@@ -16,6 +16,7 @@ import pytest
 from fclib import collections
 from fclib.collections import set_index
 from fclib.scenes.shared import added
+from helpers import ran
 
 FACTS = """
     title: ClassVar[str] = "One box"
@@ -83,14 +84,7 @@ def install(folder: Path, package: str, code: str, points: dict[str, str]) -> No
 def run(folder: Path, *words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
     """Python with the packages of a folder."""
     more = {"PYTHONPATH": str(folder), "FCLIB_CACHE": str(folder / "cache"), "COLUMNS": "200"}
-    done = subprocess.run(
-        [sys.executable, *map(str, words)],
-        env=os.environ | more,
-        capture_output=True,
-        text=True,
-        cwd=folder,
-    )
-    assert done.returncode == code, done.stdout + done.stderr
+    done = ran(sys.executable, *words, code=code, env=os.environ | more, cwd=folder)
     return done
 
 

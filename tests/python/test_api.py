@@ -1,6 +1,5 @@
 """What `import fclib` gives: light, complete, typed."""
 
-import subprocess
 import sys
 import types
 from importlib.metadata import version
@@ -11,22 +10,21 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import dense
+from helpers import dense, ran
 
 HEAVY = ("scipy", "mujoco", "typer", "rich", "matplotlib", "h5py", "dask", "plotly")
 
 
 def loaded_after(code: str) -> set[str]:
     script = f"import sys\n{code}\nprint(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    names = run.stdout.split()
+    names = ran(sys.executable, "-c", script).stdout.split()
     return {*names, *(name.partition(".")[0] for name in names)}
 
 
 def test_import_loads_nothing_heavy() -> None:
-    assert "fclib" in loaded_after("import fclib")
-    assert loaded_after("import fclib").isdisjoint(HEAVY)
-    assert "fclib.external" not in loaded_after("import fclib")
+    loaded = loaded_after("import fclib")
+    assert "fclib" in loaded
+    assert loaded.isdisjoint({*HEAVY, "fclib.external"})
 
 
 def test_reading_and_solving_load_no_more_than_they_need(tmp_path: Path) -> None:
@@ -34,6 +32,13 @@ def test_reading_and_solving_load_no_more_than_they_need(tmp_path: Path) -> None
     fclib.write(path, fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5]))
     code = f"import fclib\nassert fclib.solve(fclib.read({str(path)!r})).converged"
     assert loaded_after(code).isdisjoint(HEAVY)
+
+
+def test_a_build_begins_without_what_few_of_them_need() -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("pyarrow")
+    code = "import fclib.simulate\nfrom fclib.collections import ratings\nratings.runs()"
+    assert loaded_after(code).isdisjoint(("pandas", "scipy.spatial"))
 
 
 def test_all_is_complete_and_sorted() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import fclib
 from ball_judge import judge
-from helpers import STORAGES, dense, planted_global, planted_local, planted_rolling
+from helpers import STORAGES, converged, dense, planted_global, planted_local, planted_rolling
 
 Plain: TypeAlias = fclib.LocalProblem | fclib.GlobalProblem
 
@@ -43,8 +43,7 @@ def plain(problem: fclib.Problem) -> Plain:
 
 
 def solved(problem: fclib.Problem) -> fclib.Solution:
-    result = fclib.solve(problem, tol=1e-12)
-    assert result.converged
+    result = converged(problem, tol=1e-12)
     return result.solution
 
 

@@ -5,7 +5,6 @@ import decimal
 import json
 import math
 import os
-import subprocess
 import sys
 from typing import Any
 
@@ -19,6 +18,7 @@ from fclib.collections import set_index
 from fclib.scenes import Assembled
 from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
+from helpers import converged, ran
 
 FAMILIES: dict[str, Any] = dict(scenes.assemblies())
 ALL: dict[str, Any] = FAMILIES | dict(scenes.families())
@@ -56,8 +56,7 @@ def blocks(name: str, number: int, **parameters: Any) -> Any:
 
 
 def solved(problem: Any) -> Any:
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     return result.solution
 
 
@@ -203,14 +202,7 @@ def test_an_older_processor_assembles_the_same_problems() -> None:
         "OPENBLAS_CORETYPE": "PRESCOTT",
         "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
     }
-    told = subprocess.run(
-        [sys.executable, "-c", OLDER_PROCESSOR],
-        input=json.dumps(counts),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    told = ran(sys.executable, "-c", OLDER_PROCESSOR, input=json.dumps(counts), env=environment)
     elsewhere = json.loads(told.stdout)
     for name, count in counts.items():
         family = FAMILIES[name]()

@@ -23,6 +23,7 @@ from fclib.scenes.packing import Packing
 from helpers import (
     auto_chain,
     bodies,
+    converged,
     dense,
     last_resort,
     local_problem,
@@ -117,8 +118,7 @@ def test_islands_are_solved_one_by_one(d: int) -> None:
         at += problem.m
     mu = np.concatenate([problem.mu for problem in problems])
     whole = fclib.LocalProblem(spacedim=d, W=W, q=q, mu=mu)
-    result = fclib.solve(whole, tol=1e-12)
-    assert result.converged
+    result = converged(whole, tol=1e-12)
     expected = np.concatenate([part.solution.r for part in parts] + [np.zeros(d)])
     np.testing.assert_allclose(result.solution.r, expected, atol=1e-9)
 
@@ -414,8 +414,7 @@ HELD = "held bodies : held_bodies"
 def test_bodies_that_rest_are_held(contacts: int, seed: int, push: float, rules: str) -> None:
     """Few bodies move in a jammed packing: the others are held, and their reactions are convex."""
     problem = Packing().of_size(contacts, push, seed)
-    result = fclib.solve(problem, chain=[HELD + rules], time_limit=30)
-    assert result.converged
+    converged(problem, chain=[HELD + rules], time_limit=30)
     # some slip: the convex problem alone is another one
     assert not fclib.solve(problem, chain="associated : associated").converged
 
@@ -441,8 +440,7 @@ def test_bodies_of_an_island_are_held() -> None:
     for name in ("f", "w", "mu"):
         data[name] = np.concatenate([getattr(part, name) for part in parts])
     problem = fclib.GlobalProblem(spacedim=3, **data)
-    result = fclib.solve(problem, chain=["sweeps : gauss_seidel on=whole limit=5 worth=0", HELD])
-    assert result.converged
+    result = converged(problem, chain=["sweeps : gauss_seidel on=whole limit=5 worth=0", HELD])
     assert result.stages[-1].solved
 
 
@@ -452,8 +450,7 @@ def test_boxes_that_overlap_are_solved() -> None:
     if not path.is_file():
         pytest.skip("there is no such file")
     problem = fclib.read(path)
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     assert_honest(problem, result, 1e-10)
 
 
@@ -463,8 +460,7 @@ def test_near_a_solution_the_proximal_point_goes_on() -> None:
     if not path.is_file():
         pytest.skip("there is no such file")
     problem = fclib.read(path)
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert_honest(problem, result, 1e-8)
     solved = [stage.name for stage in result.stages if stage.solved]
     assert {"proximal point, near", "proximal point, longer"} & set(solved)
@@ -505,8 +501,7 @@ def test_the_chain_of_auto_is_its_table(tmp_path: Path) -> None:
 def test_a_chain_of_ones_own() -> None:
     problem = bodies(4, 20, mu=0.5, hyperstatic=True)
     own = ["mine : gauss_seidel on=whole limit=3 worth=0", "end : proximal_point from=best"]
-    result = fclib.solve(problem, chain=own)
-    assert result.converged
+    result = converged(problem, chain=own)
     assert stage_names(result) == ["mine", "end"]
     assert result.stages[0].iterations == 3
     assert result.stages[0].families == "splitting"
@@ -541,14 +536,12 @@ def test_a_problem_in_its_own_units_is_the_same_problem(law: str) -> None:
     problem = plain.replace(W=rows @ sp.csc_matrix(dense(plain.W)) @ rows, q=rows @ plain.q)
     if plain.p:
         problem = problem.replace(V=rows @ dense(plain.V))
-    whole = fclib.solve(problem, chain="sweeps : gauss_seidel limit=5000 worth=0")
-    assert whole.converged
+    whole = converged(problem, chain="sweeps : gauss_seidel limit=5000 worth=0")
     assert whole.iterations > 10
     sweeps = f"sweeps : gauss_seidel on=whole limit={2 * whole.iterations // 3} worth=0"
     assert fclib.solve(problem, chain=sweeps).status == "stalled"
     chain = f"{sweeps}; own : own_units from=best range="
-    result = fclib.solve(problem, chain=chain + "1e3", history=True)
-    assert result.converged
+    result = converged(problem, chain=chain + "1e3", history=True)
     assert_honest(problem, result, 1e-8)
     assert [stage.solved for stage in result.stages] == [0, 1]
     assert result.iterations <= 1.1 * whole.iterations + 10
@@ -590,8 +583,7 @@ def test_limits_hold_in_own_units() -> None:
 def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
     packing: Any = fclib.scenes.assemblies()["Packing"]()
     problem = packing.of_size(400, 0.0, 0)
-    result = fclib.solve(problem, tol=1e-3, chain=f"a : {method} worth=1000")
-    assert result.converged
+    result = converged(problem, tol=1e-3, chain=f"a : {method} worth=1000")
     (stage,) = result.stages
     assert stage.factorisations == 0
     # the limit of iterations holds to the last one
@@ -633,8 +625,7 @@ def test_a_wrong_chain_names_the_stage(chain: str | Path, message: str) -> None:
 @pytest.mark.parametrize("number", [144, 196, 234, 324, 682, 900, 1426, 1470, 1802])
 def test_nearly_parallel_joints_on_light_and_heavy_bodies(number: int) -> None:
     problem, _, _ = hard(number)
-    result = fclib.solve(problem)
-    assert result.status == "converged"
+    result = converged(problem)
     merit = fclib.merit(problem, result.solution)
     assert max(merit.error, merit.dynamics, merit.bilateral) <= 1e-8
 
@@ -644,8 +635,7 @@ def test_reactions_whose_rounding_is_more_than_the_tolerance() -> None:
     W = np.kron(np.array([[1, -1], [-1, 1 + 2.0**-28]]), np.eye(3))
     q = np.array([-1, 0.25, 0, -1, 0, 0])
     problem = fclib.LocalProblem(spacedim=3, W=W, q=q, mu=[0.5, 0.5])
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert_honest(problem, result, 1e-8)
 
 
@@ -660,8 +650,7 @@ def test_contacts_that_wedge_each_other(stage: str, number: int) -> None:
     problem, _, _ = planted(number)
     own = [line for line in auto_chain() if line.split(":")[0].strip() == stage]
     assert own
-    result = fclib.solve(problem, chain=own)
-    assert result.status == "converged"
+    result = converged(problem, chain=own)
     assert judge(problem, result.solution).error <= 1.01e-8
     others = [line for line in auto_chain() if line.split(":")[0].strip() not in WEDGED]
     assert fclib.solve(problem, chain=others, max_iterations=20000).status == "stalled"
@@ -673,8 +662,7 @@ def factorisations(result: fclib.Result) -> int:
 
 def test_factors_that_do_not_fit_into_memory_are_not_made() -> None:
     problem = bodies(11, nc=30, hyperstatic=True)
-    usual = fclib.solve(problem)
-    assert usual.converged
+    usual = converged(problem)
     assert factorisations(usual) > 0
     assert usual.message == ""
     result = fclib.solve(problem, memory_limit=1e-6)
@@ -684,8 +672,7 @@ def test_factors_that_do_not_fit_into_memory_are_not_made() -> None:
     assert pickle.loads(pickle.dumps(result)).message == result.message
     page: Any = result
     assert result.message in page._repr_html_()
-    enough = fclib.solve(problem, memory_limit=1)
-    assert enough.converged
+    enough = converged(problem, memory_limit=1)
     assert enough.message == ""
 
 
@@ -693,8 +680,7 @@ def test_factors_that_do_not_fit_into_memory_are_not_made() -> None:
 def test_sweeps_go_on_where_factors_do_not_fit(seed: int) -> None:
     problem = bodies(seed, nc=30, hyperstatic=True)
     assert factorisations(fclib.solve(problem)) > 0
-    result = fclib.solve(problem, memory_limit=1e-6)
-    assert result.converged
+    result = converged(problem, memory_limit=1e-6)
     assert factorisations(result) == 0
     fewer = [line for line in auto_chain() if ": sweep_on" not in line]
     assert not fclib.solve(problem, memory_limit=1e-6, chain=fewer).converged

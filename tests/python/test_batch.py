@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import subprocess
 import threading
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import pytest
 
 import fclib
 from capi_library import ROOT, compile_program
+from helpers import ran
 
 
 def problems(nc: int, count: int, spacedim: int = 3, seed: int = 0) -> tuple[Any, Any, Any]:
@@ -191,10 +191,7 @@ def islands(count: int, seed: int = 0) -> tuple[Any, Any, Any, Any]:
         W,
         rng.normal(size=(count, 18)),
         rng.uniform(0, 1, (count, 6)),
-        (
-            starts,
-            np.nonzero(near)[1],
-        ),
+        (starts, np.nonzero(near)[1]),
     )
 
 
@@ -525,8 +522,7 @@ def test_the_lock_of_python_is_released() -> None:
 
 def test_from_c(tmp_path: Path) -> None:
     program = compile_program(ROOT / "tests/capi/batch.c", tmp_path / "batch", "-lm")
-    done = subprocess.run([program], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
+    ran(program, timeout=60)
 
 
 def test_an_error_is_at_most_a_thousandth_of_the_tolerance_too_large() -> None:

@@ -16,19 +16,20 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 import helpers_cli
-from fclib import bench, cli
+from fclib import bench
 from fclib._solve import MERITS
 from fclib.bench import problems
 from fclib.bench.job import Job, Record
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
+from helpers_cli import invoke
 
 KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
 RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "200"))
@@ -49,8 +50,7 @@ def campaign(**changes: Any) -> bench.Campaign:
     return bench.Campaign.of(entries | changes)
 
 
-def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return helpers_cli.run("bench", *arguments)
+run_cli = partial(helpers_cli.run, "bench")
 
 
 # ---- what is run
@@ -257,8 +257,7 @@ def test_no_run_is_lost_or_doubled_by_kill_9(tmp_path: Path) -> None:
             assert seen.items() <= now.items()
             seen = now
         counts.append(len(seen))
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    ran(*command)
     with bench.Store(path) as store:
         rows = store.results()
         states = store.status()
@@ -332,12 +331,11 @@ def elsewhere(source: Path, target: Path, node: str) -> None:
 def test_what_cannot_begin_leaves_no_store(small: Path, tmp_path: Path) -> None:
     path = tmp_path / "new.sqlite"
     arguments = ("--problems", tmp_path / "none.hdf5", "--solver", "auto", "--store")
-    done = run_cli(*arguments, path)
-    assert done.returncode != 0
+    done = run_cli(*arguments, path, code=1)
     assert "none.hdf5" in done.stderr
     assert list(tmp_path.iterdir()) == []
     runs = len(bench.Store(small).results())
-    assert run_cli(*arguments, small).returncode != 0
+    run_cli(*arguments, small, code=1)
     assert len(bench.Store(small).results()) == runs > 0
 
 
@@ -353,8 +351,7 @@ def test_interrupted_before_there_is_a_store(
     command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
     command += ["--scheduler", "tcp://localhost:1", "--store", store]
     before = signal.getsignal(signal.SIGINT)
-    result = CliRunner().invoke(cli.app, list(map(str, command)))
-    assert result.exit_code == 130
+    result = invoke(*command, code=130)
     assert "interrupted" in result.stderr
     assert signal.getsignal(signal.SIGINT) is before
     assert not store.exists()
@@ -363,8 +360,7 @@ def test_interrupted_before_there_is_a_store(
 def test_merge(small: Path, tmp_path: Path) -> None:
     elsewhere(small, tmp_path / "other.sqlite", "other")
     merged = tmp_path / "merged.sqlite"
-    done = run_cli("merge", merged, small, tmp_path / "other.sqlite")
-    assert done.returncode == 0, done.stderr
+    run_cli("merge", merged, small, tmp_path / "other.sqlite")
     with bench.Store(merged) as store, bench.Store(small) as first:
         rows, original = store.results(), first.results()
         assert len(rows) == 2 * len(original)
@@ -377,7 +373,7 @@ def test_merge(small: Path, tmp_path: Path) -> None:
         # once more changes nothing
         assert store.merge([small, tmp_path / "other.sqlite"]) == 0
         assert len(store.status()) == 1
-    assert run_cli("merge", merged, merged).returncode == 1
+    run_cli("merge", merged, merged, code=1)
 
 
 def test_some_of_the_runs(small: Path) -> None:
@@ -396,8 +392,7 @@ def test_export(small: Path, tmp_path: Path) -> None:
         rows, columns = store.results(), store.columns()
     assert list(rows[0]) == columns
     for name in ("runs.csv", "runs.parquet"):
-        done = run_cli("export", small, tmp_path / name)
-        assert done.returncode == 0, done.stderr
+        run_cli("export", small, tmp_path / name)
     assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == rows
     import csv
 
@@ -405,12 +400,11 @@ def test_export(small: Path, tmp_path: Path) -> None:
         read = list(csv.DictReader(file))
     assert [float(row["error"]) for row in read] == [row["error"] for row in rows]
     assert sorted(tmp_path.iterdir()) == [tmp_path / "runs.csv", tmp_path / "runs.parquet"]
-    assert run_cli("export", small, tmp_path / "runs.txt").returncode == 1
+    run_cli("export", small, tmp_path / "runs.txt", code=1)
 
 
 def test_status(small: Path) -> None:
     done = run_cli("--status", small, "--json")
-    assert done.returncode == 0, done.stderr
     (record,) = map(json.loads, done.stdout.splitlines())
     assert (record["state"], record["runs"], record["solved"]) == ("finished", "18 of 18", 18)
     assert "finished" in run_cli("--status", small).stdout
@@ -434,7 +428,7 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         bench.Store(tmp_path)
     with pytest.raises(bench.StoreError, match="there is no folder"):
         bench.Store(tmp_path / "absent" / "new.sqlite")
-    assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
+    run_cli("--status", tmp_path / "absent.sqlite", code=1)
     assert not (tmp_path / "absent.sqlite").exists()
 
 
@@ -458,8 +452,8 @@ def test_what_is_no_store_is_not_made_one(tmp_path: Path) -> None:
 def test_what_cannot_be_merged_leaves_no_store(tmp_path: Path) -> None:
     new, wrong = tmp_path / "new.sqlite", tmp_path / "wrong.parquet"
     wrong.write_text("no table")
-    assert run_cli("merge", new, tmp_path / "none.sqlite").returncode == 1
-    assert run_cli("merge", new, wrong).returncode == 1
+    run_cli("merge", new, tmp_path / "none.sqlite", code=1)
+    run_cli("merge", new, wrong, code=1)
     with pytest.raises(RuntimeError), bench.Store(new):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == [wrong]
@@ -580,9 +574,7 @@ def test_what_is_spoilt_from_outside_is_tried_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("hasty")
-def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(
-    tmp_path: Path,
-) -> None:
+def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(tmp_path: Path) -> None:
     done: list[str] = []
     chosen = campaign(repeats=2)
     unlucky = chosen.plan()[3].key
@@ -603,10 +595,7 @@ def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(
         assert store.faults() == []
     # and those of a status that is named
     more = bench.run_campaign(
-        chosen,
-        tmp_path / "a.sqlite",
-        runner=fake(lambda *_: "converged", done),
-        retry=["stalled"],
+        chosen, tmp_path / "a.sqlite", runner=fake(lambda *_: "converged", done), retry=["stalled"]
     )
     assert (more.skipped, more.solved) == (1, 35)
 
@@ -631,8 +620,7 @@ def test_the_campaign_that_stops_says_so_and_exits_with_1(
     arguments += ["--store", str(store), "--retries", "0"]
     lost = Record("lost", "gone")
     monkeypatch.setattr("fclib.bench.pool.run", lambda jobs, _: ((job, lost) for job in jobs))
-    done = CliRunner().invoke(cli.app, arguments)
-    assert done.exit_code == 1
+    done = invoke(*arguments, code=1)
     assert "stopped: 1 of 1 run could not be done" in " ".join(done.stderr.split())
     assert bench.Store(store).results() == []
 
@@ -1013,17 +1001,16 @@ def test_files_folders_and_globs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_a_campaign_by_flags(tmp_path: Path) -> None:
     fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
     path = tmp_path / "store.sqlite"
-    done = run_cli(
+    run_cli(
         *("--problems", tmp_path / "*.hdf5", "--solver", "nsgs", "--solver", "nsgs relaxation=1.1"),
         *("--tol", "1e-4", "--tol", "1e-6", "--time-limit", "5", "--store", path),
     )
-    assert done.returncode == 0, done.stderr
     with bench.Store(path) as store:
         rows = store.results()
     assert len(rows) == 4
     assert {row["time_limit"] for row in rows} == {5}
-    assert run_cli("--problems", tmp_path).returncode == 2
-    assert run_cli("nowhere.toml").returncode == 2
+    run_cli("--problems", tmp_path, code=2)
+    run_cli("nowhere.toml", code=2)
 
 
 def test_the_published_campaigns_are_understood(

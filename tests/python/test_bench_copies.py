@@ -12,7 +12,7 @@ import fclib
 from fclib import bench
 from fclib.bench import comparison, profiles
 from fclib.bench.copies import Copy
-from helpers import planted_global, planted_local, planted_rolling
+from helpers import converged, planted_global, planted_local, planted_rolling
 
 PROBLEMS = {
     "local": planted_local(3, nc=5).problem,
@@ -44,8 +44,7 @@ def test_a_solution_of_a_copy_is_one_of_the_problem(name: str) -> None:
     problem = PROBLEMS[name]
     for number in (1, 2):
         copy = Copy(problem, number)
-        result = fclib.solve(copy.problem, tol=1e-11)
-        assert result.converged
+        result = converged(copy.problem, tol=1e-11)
         vectors = {k: getattr(result.solution, k) for k in "vurl"}
         back = copy.back({k: value for k, value in vectors.items() if value is not None})
         carried = fclib.Solution(**back)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rebuild
-from helpers import git, script
+from helpers import git, ran, script
 
 DEPENDENCIES = """\
 core/a.o: #deps 3, deps mtime 1700000000000000000 (VALID)
@@ -253,13 +253,8 @@ def test_another_project_takes_the_c_library_in(root: Path, tmp_path: Path, take
         "add_executable(mine mine.c)\ntarget_link_libraries(mine fclib::fclib)\n"
     )
     build = tmp_path / "build"
-    done = subprocess.run(
-        [cmake, "-S", tmp_path, "-B", build, "-G", "Ninja"], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    targets = subprocess.run(
-        ["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True
-    ).stdout
+    ran(cmake, "-S", tmp_path, "-B", build, "-G", "Ninja")
+    targets = ran("ninja", "-C", build, "-t", "targets", "all").stdout
     assert re.search(r"libfclib\.(so|a|dylib)", targets)
     assert "_core_stub" not in targets, "the extension of Python is no part of another's project"
 
@@ -329,10 +324,7 @@ def test_a_release_has_checksums_and_a_list_of_parts(
 
 def test_javascript_is_linted_or_it_is_said_that_it_is_not(root: Path) -> None:
     def dry(*words: str) -> str:
-        done = subprocess.run(
-            ["make", "--dry-run", "lint", *words], cwd=root, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
+        done = ran("make", "--dry-run", "lint", *words, cwd=root)
         return done.stdout
 
     without, with_npm = dry("HAS_NPM="), dry("HAS_NPM=/usr/bin/npm")
@@ -390,6 +382,6 @@ def test_the_readme_of_the_scripts_has_a_line_on_each(root: Path) -> None:
 def test_make_help_shows_every_verb(root: Path) -> None:
     text = (root / "Makefile").read_text()
     verbs = re.findall(r"^\.PHONY: (.*?[^\\])$", text, re.MULTILINE | re.DOTALL)
-    shown = subprocess.run(["make", "help"], cwd=root, capture_output=True, text=True).stdout
+    shown = ran("make", "help", cwd=root).stdout
     for verb in verbs[0].replace("\\", " ").split():
         assert verb == "help" or re.search(rf"^make {verb} ", shown, re.MULTILINE), verb

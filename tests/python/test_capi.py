@@ -14,20 +14,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 import capi_abi
 import fclib
-from capi_library import (
-    CAPI,
-    HEADERS,
-    ROOT,
-    compile_fortran,
-    compile_program,
-    library_folder,
-)
-from fclib.cli import app
-from helpers import Array, dense, modified, planted_global, planted_local, project
+from capi_library import CAPI, HEADERS, ROOT, compile_fortran, compile_program, library_folder
+from helpers import Array, dense, modified, planted_global, planted_local, project, ran
+from helpers_cli import invoke
 
 # where libfclib 3.1 is installed, or unpacked with what it needs
 PEER = Path(os.environ.get("FCLIB_PEER", "/usr"))
@@ -50,8 +42,7 @@ def checks(programs: Path) -> Path:
 
 
 def test_what_the_header_promises(checks: Path, tmp_path: Path) -> None:
-    done = subprocess.run([checks, tmp_path], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
+    done = ran(checks, tmp_path, timeout=300)
     assert done.stdout == done.stderr == "", "the library prints nothing"
 
 
@@ -62,10 +53,7 @@ def valgrind(*command: object) -> None:
     options = ["--quiet", "--error-exitcode=99"]
     if not str(command[0]).startswith("--tool"):
         options.append("--leak-check=full")
-    done = subprocess.run(
-        [tool, *options, *map(str, command)], capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
+    ran(tool, *options, *command, timeout=300)
 
 
 @pytest.mark.slow
@@ -79,8 +67,8 @@ def threads(programs: Path) -> Path:
 
 
 def test_threads_do_not_disturb_each_other(threads: Path, tmp_path: Path) -> None:
-    done = subprocess.run([threads, tmp_path], capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = ran(threads, tmp_path, timeout=300)
+    assert (done.stdout, done.stderr) == ("", "")
 
 
 @pytest.mark.slow
@@ -98,9 +86,7 @@ def test_only_the_interface_is_exported() -> None:
     if tool is None:
         pytest.skip("there is no nm")
     library = library_folder() / "libfclib.so.0"
-    names = subprocess.run(
-        [tool, "--dynamic", "--defined-only", library], capture_output=True, text=True, check=True
-    )
+    names = ran(tool, "--dynamic", "--defined-only", library)
     exported = {line.split()[-1] for line in names.stdout.splitlines()}
     versions = set(capi_abi.exported().values())
     assert versions == {"FCLIB_3.1", "FCLIB_3.2"}
@@ -120,9 +106,7 @@ def test_the_binary_interface_is_the_recorded_one(tmp_path: Path) -> None:
     if shutil.which("abidw") is None or shutil.which("abidiff") is None:
         pytest.skip("there is no libabigail")
     now = capi_abi.describe(tmp_path)
-    done = subprocess.run(
-        ["abidiff", "--no-added-syms", capi_abi.RECORDED, now], capture_output=True, text=True
-    )
+    done = ran("abidiff", "--no-added-syms", capi_abi.RECORDED, now, code=None)
     assert done.returncode == 0, (
         f"{done.stdout}\ndocs/compiled.md has the policy; python tests/capi_abi.py --write"
     )
@@ -151,8 +135,8 @@ def by_name(programs: Path) -> Path:
 
 
 def test_what_goes_by_name(by_name: Path, tmp_path: Path) -> None:
-    done = subprocess.run([by_name, tmp_path], capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = ran(by_name, tmp_path, timeout=300)
+    assert (done.stdout, done.stderr) == ("", "")
     text = fclib.read_siconos(tmp_path / "ball.dat")
     assert isinstance(text, fclib.LocalProblem)
 
@@ -168,8 +152,8 @@ def facade(programs: Path) -> Path:
 
 
 def test_what_the_cpp_header_promises(facade: Path, tmp_path: Path) -> None:
-    done = subprocess.run([facade, tmp_path], capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = ran(facade, tmp_path, timeout=300)
+    assert (done.stdout, done.stderr) == ("", "")
 
 
 @pytest.mark.long
@@ -192,27 +176,21 @@ def examples(programs: Path) -> dict[str, Path]:
 def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
     path = tmp_path / "ball.hdf5"
     for _ in range(2):  # the file may be there already
-        done = subprocess.run([examples["write"], path], capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
+        done = ran(examples["write"], path)
+        assert done.stderr == ""
     problem, solution = fclib.read(path), fclib.read_solution(path)
     assert problem.info.title == "a ball on a plane"
     assert solution is not None
     assert fclib.merit(problem, solution).error == 0
 
-    done = subprocess.run([examples["solve"], path], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = ran(examples["solve"], path)
     assert "converged" in done.stdout
     assert "contact 0: r = 1 -0.5" in done.stdout
-    done = subprocess.run(
-        [examples["sequence"], tmp_path / "run.h5"], capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(examples["sequence"], tmp_path / "run.h5")
+    assert done.stderr == ""
     assert done.stdout.startswith("100 steps\nstep 0: slides with 1.95 m/s, error ")
     assert len(fclib.Sequence(tmp_path / "run.h5")) == 100
-    done = subprocess.run(
-        [examples["solve"], path, "no_such_solver"], capture_output=True, text=True
-    )
-    assert done.returncode == 1
+    done = ran(examples["solve"], path, "no_such_solver", code=1)
     assert "no_such_solver" in done.stderr
 
 
@@ -230,19 +208,17 @@ def check_ball(program: Path, folder: Path) -> None:
     """A program that writes a ball on a plane into a file, and solves it."""
     path = folder / "ball.hdf5"
     for _ in range(2):  # the file may be there already
-        done = subprocess.run([program, path], capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
+        done = ran(program, path)
+        assert done.stderr == ""
         assert "a ball on a plane" in done.stdout
         assert "converged" in done.stdout
     problem, solution = fclib.read(path), fclib.read_solution(path)
     assert problem.info.title == "a ball on a plane"
     assert solution is not None
     assert fclib.merit(problem, solution).error < 1e-10
-    done = subprocess.run([program, folder / "no" / "folder"], capture_output=True, text=True)
-    assert done.returncode == 1
+    done = ran(program, folder / "no" / "folder", code=1)
     assert "no/folder: cannot be written" in done.stderr
-    done = subprocess.run([program], capture_output=True, text=True)
-    assert done.returncode == 2
+    done = ran(program, code=2)
     assert "usage" in done.stderr
 
 
@@ -258,8 +234,8 @@ def stack_example(programs: Path) -> Path:
 def test_the_bodies_of_the_example_are_drawn(stack_example: Path, tmp_path: Path) -> None:
     path = tmp_path / "stack.hdf5"
     for _ in range(2):  # the file may be there already
-        done = subprocess.run([stack_example, path], capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
+        done = ran(stack_example, path)
+        assert done.stderr == ""
         assert done.stdout.startswith("converged")
     problem, solution = fclib.read(path), fclib.read_solution(path)
     assert fclib.left_out(path) == []
@@ -275,8 +251,7 @@ def test_the_bodies_of_the_example_are_drawn(stack_example: Path, tmp_path: Path
     assert force[:4].sum() == pytest.approx(force[4] + 9.81e-3)
     for name in ("view", "bare"):
         page = tmp_path / f"{name}.html"
-        shown = CliRunner().invoke(app, ["view", str(path), "--out", str(page)])
-        assert shown.exit_code == 0, shown.output
+        invoke("view", path, "--out", page)
         assert ('"ball"' in page.read_text()) == (name == "view")
         fclib.write(path, problem.replace(contacts=None, bodies=None), mode="replace")
 
@@ -303,8 +278,8 @@ def test_the_example_in_fortran_runs(fortran_example: Path, tmp_path: Path) -> N
 def test_the_example_in_python_runs(tmp_path: Path) -> None:
     path = tmp_path / "balls.hdf5"
     command = [sys.executable, str(ROOT / "examples/python/ball.py")]
-    done = subprocess.run([*command, str(path)], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(*command, path)
+    assert done.stderr == ""
     assert "converged" in done.stdout
     problem, solution = fclib.read(path), fclib.read_solution(path)
     assert problem.formulation == "GM3DFC"
@@ -324,8 +299,8 @@ def fortran(programs: Path) -> Path:
 
 
 def test_what_the_fortran_module_promises(fortran: Path, tmp_path: Path) -> None:
-    done = subprocess.run([fortran, tmp_path], capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = ran(fortran, tmp_path, timeout=300)
+    assert (done.stdout, done.stderr) == ("", "")
     path = tmp_path / "bodies.hdf5"
     problem = fclib.read(path)
     assert fclib.left_out(path) == []
@@ -355,11 +330,7 @@ def without_comments(header: str) -> str:
     return re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
 
 
-IN_FORTRAN = {
-    "int": "integer(c_int)",
-    "double": "real(c_double)",
-    "size_t": "integer(c_size_t)",
-}
+IN_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)", "size_t": "integer(c_size_t)"}
 
 
 def in_fortran(declaration: str) -> str:
@@ -417,15 +388,7 @@ class Library:
     environment: dict[str, str]
 
     def __call__(self, verb: str, words: str) -> str:
-        done = subprocess.run(
-            [self.program, verb],
-            input=words,
-            capture_output=True,
-            text=True,
-            env=self.environment,
-            timeout=120,
-        )
-        assert done.returncode == 0, f"{self.name} {verb}: {done.stderr[-1000:]}"
+        done = ran(self.program, verb, input=words, env=self.environment, timeout=120)
         return done.stdout
 
 
@@ -496,10 +459,7 @@ def test_clients_of_3_1_notice_nothing(
     )
 
     def seen(program: Path, *folders: Path) -> str:
-        done = subprocess.run(
-            [program, "write", tmp_path], capture_output=True, text=True, env=at(*folders)
-        )
-        assert done.returncode == 0, done.stderr
+        done = ran(program, "write", tmp_path, env=at(*folders))
         return done.stdout
 
     expected = seen(theirs, peer_folder)
@@ -511,8 +471,8 @@ def test_clients_of_3_1_notice_nothing(
 
 def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path) -> None:
     path = tmp_path / "mixed_global"
-    written = subprocess.run([old_clients, "write", tmp_path], capture_output=True, text=True)
-    assert (written.returncode, written.stderr) == (0, "")
+    written = ran(old_clients, "write", tmp_path)
+    assert written.stderr == ""
     problem = fclib.read(path)
     assert isinstance(problem, fclib.GlobalProblem)
     assert problem.G is not None
@@ -546,10 +506,8 @@ def test_clients_of_3_1_read_dense_problems(dense: bool, old_clients: Path, tmp_
     stored = fclib.read(tmp_path / "dense.hdf5")
     assert isinstance(stored, fclib.LocalProblem)
     assert isinstance(stored.W, np.ndarray) == dense
-    done = subprocess.run(
-        [old_clients, "read", tmp_path / "dense.hdf5"], capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(old_clients, "read", tmp_path / "dense.hdf5")
+    assert done.stderr == ""
     size, *entries = done.stdout.splitlines()
     assert size == "3 x 3"
     seen = np.zeros((3, 3))
@@ -561,7 +519,7 @@ def test_clients_of_3_1_read_dense_problems(dense: bool, old_clients: Path, tmp_
 
 
 def test_who_looks_at_no_result_is_told(old_clients: Path, tmp_path: Path) -> None:
-    done = subprocess.run([old_clients, "fail", tmp_path / "none"], capture_output=True, text=True)
+    done = ran(old_clients, "fail", tmp_path / "none", code=None)
     assert done.stderr == f"fclib: {tmp_path / 'none'}: there is no such file\n"
 
 
@@ -722,8 +680,7 @@ def test_files_go_both_ways(
 
 
 @pytest.mark.parametrize(
-    "kind",
-    ["local", "global", "local_rolling", "global_rolling", "local_spin", "global_spin"],
+    "kind", ["local", "global", "local_rolling", "global_rolling", "local_spin", "global_spin"]
 )
 def test_files_come_back(
     kind: str, ours: Library, tmp_path_factory: pytest.TempPathFactory
@@ -845,10 +802,7 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
 
     def run(*command: object) -> str:
         environment = os.environ | {"PKG_CONFIG_PATH": ":".join(map(str, found))}
-        done = subprocess.run(
-            list(map(str, command)), capture_output=True, text=True, env=environment
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
+        done = ran(*command, env=environment)
         return done.stdout
 
     found: list[Path] = []
@@ -918,9 +872,5 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
         flags = run(config, "--cflags", "--libs", "fclib-fortran").split()
         run(gfortran, source, "-o", programs[-1], *flags)
     for program in programs:
-        ran = subprocess.run(
-            [program, tmp_path / "ball.hdf5"],
-            env=os.environ | {"LD_LIBRARY_PATH": str(library)},
-            capture_output=True,
-        )
-        assert ran.returncode == 0
+        environment = os.environ | {"LD_LIBRARY_PATH": str(library)}
+        ran(program, tmp_path / "ball.hdf5", env=environment)

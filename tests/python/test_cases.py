@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,7 +16,8 @@ import scipy.sparse as sp
 import fclib
 from ball_judge import judge
 from fclib import analysis
-from helpers import dense, last_resort, ring
+from helpers import converged, dense, last_resort, ring
+from helpers_cli import run
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -65,8 +64,7 @@ def test_what_has_a_solution_is_not_called_infeasible(path: Path) -> None:
     problem = fclib.read(path)
     # of cx09 the last digit of the reactions is worth 6e-7
     tolerance = 1e-7 if path.name.startswith("cx09") else 1e-8
-    result = fclib.solve(problem, tol=tolerance)
-    assert result.status == "converged"
+    result = converged(problem, tol=tolerance)
     if not path.name.startswith("cx07"):  # what its large multipliers round is taken off there
         assert judge(problem, result.solution).error <= tolerance
     assert analysis.analyze(problem, time_limit=5).existence.verdict != analysis.PROVEN_NOT
@@ -178,12 +176,10 @@ def test_a_certificate_from_a_file(tmp_path: Path) -> None:
     good.write_text(json.dumps(proof.record(problem)))
     wrong = tmp_path / "wrong.json"
     wrong.write_text(json.dumps({"y": {"0": 1, "1": 1}}))
-    command = [sys.executable, "-m", "fclib", "check", str(tmp_path / "ring.hdf5"), "--json"]
-    done = subprocess.run([*command, "--certificate", str(good)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    command = ("check", tmp_path / "ring.hdf5", "--json", "--certificate")
+    done = run(*command, good)
     assert json.loads(done.stdout)["exact"] is True
-    done = subprocess.run([*command, "--certificate", str(wrong)], capture_output=True, text=True)
-    assert done.returncode == 1
+    done = run(*command, wrong, code=1)
     assert "contact 0" in json.loads(done.stdout)["message"]
 
 
@@ -199,10 +195,7 @@ def test_missing_data_are_no_proof(path: Path) -> None:
     with pytest.raises(fclib.Error, match=re.escape(f"{path}: {words}")):
         fclib.read(path)
     for command in ("info", "check", "solve", "analyze"):
-        done = subprocess.run(
-            [sys.executable, "-m", "fclib", command, str(path)], capture_output=True, text=True
-        )
-        assert done.returncode == 1
+        done = run(command, path, code=1)
         assert done.stdout == ""
         assert words in done.stderr
 
@@ -218,8 +211,7 @@ def test_a_packed_triangle_is_the_whole(path: Path) -> None:
         p, i, x = (group[name][:] for name in ("p", "i", "x"))
     lower = sp.csc_array((x, i, p), shape=(6, 6)).toarray()
     np.testing.assert_array_equal(W, lower + lower.T - np.diag(np.diag(lower)))
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert judge(problem, result.solution).error <= 1e-8
 
 
@@ -227,8 +219,7 @@ def test_a_packed_triangle_is_the_whole(path: Path) -> None:
 def test_what_other_programs_write_is_read(path: Path) -> None:
     problem = fclib.read(path)
     assert problem.nc == 2
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert judge(problem, result.solution).error <= 1e-8
     title = {"text_as_uint8": "bytes as numbers"}.get(path.stem, "")
     assert problem.info.title == title

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from ball_judge import judge
-from fclib.cli import app
-from helpers import Array, bodies, case, dense, planted_global, planted_local
+from helpers import Array, bodies, case, converged, dense, planted_global, planted_local
+from helpers_cli import invoke
 
 TOLERANCE = 1e-8
 # the part that is wrong and by how much [m/s]
@@ -29,23 +28,22 @@ WRONG = {
 def test_a_stored_velocity_that_is_wrong_is_named(name: str) -> None:
     path = case(f"{name}.hdf5")
     part, size = WRONG[name]
-    answer = CliRunner().invoke(app, ["check", str(path), "--json"])
-    assert answer.exit_code == 1
+    answer = invoke("check", path, "--json", code=1)
     record = json.loads(answer.stdout.strip().splitlines()[-1])
     assert record["status"] == "wrong"
     assert record["error"] > 0.5
     named = {one["part"]: one for one in record["mismatches"]}
     assert abs(named[part]["difference"]) == pytest.approx(size, rel=0.01)
-    assert f"{part}[{named[part]['index']}]" in CliRunner().invoke(app, ["check", str(path)]).output
+    assert f"{part}[{named[part]['index']}]" in invoke("check", path, code=1).output
 
 
 def test_a_grain_flung_up_is_not_ok() -> None:
     path = case("cx11_merit_small_grain.hdf5")
-    answer = CliRunner().invoke(app, ["check", str(path), "--json"])
+    answer = invoke("check", path, "--json", code=1)
     record = json.loads(answer.stdout)
     assert record["status"] == "wrong"
     assert record["scaled_natural"] == pytest.approx(3.99, abs=0.02)
-    assert CliRunner().invoke(app, ["check", str(path), "--merit", "natural"]).exit_code == 0
+    invoke("check", path, "--merit", "natural")
 
 
 def test_small_masses_are_solved_in_both_merits() -> None:
@@ -54,8 +52,7 @@ def test_small_masses_are_solved_in_both_merits() -> None:
     merit = fclib.merit(problem, result.solution)
     assert (result.status == "converged") == (max(merit.natural, merit.scaled_natural) <= TOLERANCE)
     assert result.status == "converged"
-    natural = fclib.solve(problem, tol=TOLERANCE, merit="natural")
-    assert natural.status == "converged"
+    natural = converged(problem, tol=TOLERANCE, merit="natural")
     assert fclib.merit(problem, natural.solution).error_by("natural") <= TOLERANCE
 
 
@@ -120,8 +117,7 @@ def test_no_friction_hides_a_penetration(mu: float, rolling: bool) -> None:
     q[:2] = -1.0, 1.0
     problem = kind(spacedim=d, W=np.eye(d), q=q, mu=[mu], **law)
     assert fclib.merit(problem, np.zeros(d)).scaled_natural > 0.5
-    result = fclib.solve(problem, tol=TOLERANCE)
-    assert result.converged
+    result = converged(problem, tol=TOLERANCE)
     assert np.asarray(result.solution.u)[0] > -1e-6
 
 
@@ -222,8 +218,7 @@ def test_a_problem_with_nothing_to_do_is_solved(solver: str) -> None:
         problem = tree_in_flight(seed)
         assert np.linalg.norm(problem.condense().q) < 1e-12
         for tol in (1e-4, 1e-8, 1e-12):
-            result = fclib.solve(problem, solver, tol)
-            assert result.status == "converged"
+            result = converged(problem, solver, tol)
             assert fclib.merit(problem, result.solution).error <= tol
             assert np.linalg.norm(result.solution.r) < 1e-9
 
@@ -235,8 +230,7 @@ def test_more_than_rounding_is_to_be_done() -> None:
     w[0] = -1e-9
     problem = problem.replace(w=w)
     assert fclib.merit(problem, fclib.Solution(r=np.zeros(problem.m))).natural > 0.5
-    result = fclib.solve(problem, tol=1e-4)
-    assert result.status == "converged"
+    result = converged(problem, tol=1e-4)
     assert result.solution.r[0] > 0
 
 
@@ -264,8 +258,7 @@ def test_the_tolerance_holds_in_any_units(impulse: float) -> None:
 
 def test_the_natural_map_alone_may_be_asked_for() -> None:
     problem = bodies(1, nc=6).scaled(impulse=1e-9)
-    alone = fclib.solve(problem, tol=TOLERANCE, merit="natural")
-    assert alone.status == "converged"
+    alone = converged(problem, tol=TOLERANCE, merit="natural")
     assert alone.error == fclib.merit(problem, alone.solution).error_by("natural")
     both = fclib.solve(problem, tol=TOLERANCE)
     assert both.error == fclib.merit(problem, both.solution).error

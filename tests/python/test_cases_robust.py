@@ -8,6 +8,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
+from helpers import converged
 
 CASES = Path(__file__).parents[2].parent / "shared" / "data" / "cases"
 
@@ -54,8 +55,7 @@ def test_nearly_parallel_joints_between_light_and_heavy_bodies() -> None:
     problem = case(
         "cx07"
     )  # multipliers of 1e11, rounded to a metre per second of the lightest body
-    result = fclib.solve(problem)
-    assert result.status == "converged"
+    result = converged(problem)
     assert fclib.merit(problem, result.solution).error <= 1e-8
 
 

@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
-from fclib.cli import app
 
 pytest.importorskip("pyarrow")
 
 from fclib import collections
 from fclib.collections import catalog
 from fclib.collections.set_index import DATA
+from helpers_cli import invoke
 
 # what they give is of one kind here
 read: Any = fclib.read
@@ -44,8 +43,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before, out = contents(source), tmp_path / "collection"
-    result = CliRunner().invoke(app, ["collection", "add", str(source), "--out", str(out)])
-    assert result.exit_code == 1
+    result = invoke("collection", "add", source, "--out", out, code=1)
     assert "torn.hdf5" in result.stderr
     assert contents(source) == before
     rows = collections.read_catalog(out).to_pylist()
@@ -70,10 +68,10 @@ def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.Mo
     # nor does a copy whose solution nobody looked for keep silent
     quick = tmp_path / "quick"
     arguments = ["collection", "add", str(source), "--no-references", "--out", str(quick)]
-    CliRunner().invoke(app, arguments)
+    invoke(*arguments, code=1)
     paths = list(quick.glob("from_afar/*/*.hdf5"))
     assert sum(read_solution(path) is None for path in paths) == 1
-    assert CliRunner().invoke(app, ["check", *map(str, paths)]).exit_code == 0
+    invoke("check", *paths)
     assert all(verdict.ok for verdict in collections.verify(quick))
     monkeypatch.setenv("FCLIB_COLLECTION", str(out))
     assert len(fclib.collection("from_afar")) == 3
@@ -108,9 +106,7 @@ def test_what_is_no_solution_is_not_taken_in_as_one(tmp_path: Path) -> None:
         assert info["numberOfInvolvedDS"] == 3
         assert all(verdict.ok for verdict in collections.verify(out))
     assert rows_of(out)["zero.hdf5"]["same_as"] == "mine/afar/0000"
-    done = CliRunner().invoke(
-        app, ["collection", "add", str(folder), "--name", "mine", "--out", str(out)]
-    )
+    done = invoke("collection", "add", folder, "--name", "mine", "--out", out)
     assert "zero.hdf5: the same problem as mine/afar/0000" in " ".join(done.output.split())
 
 
@@ -176,8 +172,8 @@ def test_what_cannot_be_added_is_one_line(
     source: Path, tmp_path: Path, where: str, name: str, words: str
 ) -> None:
     (tmp_path / "empty").mkdir()
-    result = CliRunner().invoke(
-        app, ["collection", "add", str(tmp_path / where), "--name", name, "--out", str(source)]
+    result = invoke(
+        "collection", "add", tmp_path / where, "--name", name, "--out", source, code=None
     )
     assert result.exit_code in (1, 2)
     assert words in " ".join(result.stderr.replace("│", " ").split())
@@ -190,8 +186,7 @@ def test_a_name_that_no_catalogue_holds_is_left_out(source: Path, tmp_path: Path
     except OSError:
         pytest.skip("the file system has names in UTF-8 alone")
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["collection", "add", str(source), "--out", str(out)])
-    assert result.exit_code == 1
+    result = invoke("collection", "add", source, "--out", out, code=1)
     assert "its name is not UTF-8" in " ".join(result.stderr.split())
     rows = catalog.read_catalog(out).to_pylist()
     assert found[0].relative_to(source).as_posix() in {row["source"] for row in rows}

@@ -5,6 +5,7 @@ import json
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +18,19 @@ from hypothesis import strategies as st
 import fclib
 import helpers_cli
 from ball_judge import judge
-from helpers import Array, dense, planted_global, planted_local
+from helpers import Array, dense, planted_global, planted_local, ran
 
 STORAGES = ("csr", "csc", "triplet", "dense")
 MATRICES = ("W", "V", "R", "M", "H", "G")
 VECTORS = ("q", "mu", "s", "f", "w", "b", "mu_r")
 
 
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return helpers_cli.run("convert", *arguments)
+run = partial(helpers_cli.run, "convert")
 
 
 def converted(*arguments: object) -> dict[str, Any]:
     """The one record of a conversion that must go well."""
     result = run("--json", *arguments)
-    assert result.returncode == 0, result.stderr
     (line,) = result.stdout.splitlines()
     record = json.loads(line)
     assert isinstance(record, dict)
@@ -250,7 +249,7 @@ def test_a_chain_from_a_text_to_a_solution(tmp_path: Path) -> None:
     assert fclib.read(file).info.title == "a"
     assert converted(file, local, "--form", "local")["becomes"] == "3DFC"
 
-    assert helpers_cli.run("solve", "--write", local).returncode == 0
+    helpers_cli.run("solve", "--write", local)
     solution = fclib.read_solution(local)
     assert solution is not None
     assert judge(case.problem, fclib.Solution(r=solution.r)).error <= 1e-7
@@ -281,8 +280,7 @@ def test_storages_that_a_format_does_not_have(tmp_path: Path) -> None:
     fclib.write(source, planted_global(1).problem)
     for ending, storage, stored in ((".hdf5", "csc", "triplet"), (".dat", "csr", "csc")):
         target = tmp_path / f"out{ending}"
-        result = run("--storage", storage, source, target)
-        assert result.returncode == 1
+        result = run("--storage", storage, source, target, code=1)
         start = f"fclib: {source}: the matrices of a global problem are {stored} in "
         assert result.stderr.startswith(start)
         assert len(result.stderr.splitlines()) == 1
@@ -365,7 +363,6 @@ def test_the_loss_of_all_that_a_text_cannot_hold_is_said(tmp_path: Path) -> None
     known = {"W": fclib.MatrixInfo(rank=18)}
     fclib.write(source, case.problem.replace(matrix_info=known), case.solution, [case.solution])
     result = run(source, target)
-    assert result.returncode == 0
     note = (
         f"fclib: {source}: the solution, the guesses and what is known of the matrices are left "
         "out, Siconos' text has no place for them"
@@ -381,7 +378,6 @@ def test_the_loss_of_a_solution_is_said(tmp_path: Path) -> None:
     source = tmp_path / "in.hdf5"
     fclib.write(source, case.problem, case.solution)
     result = run(source, tmp_path / "out.dat")
-    assert result.returncode == 0
     note = f"fclib: {source}: the solution is left out, Siconos' text has no place for it"
     assert result.stderr.splitlines() == [note]
 
@@ -389,8 +385,7 @@ def test_the_loss_of_a_solution_is_said(tmp_path: Path) -> None:
 def test_mixed_problems_become_texts_without_their_constraints(tmp_path: Path) -> None:
     source, target = tmp_path / "in.hdf5", tmp_path / "out.dat"
     fclib.write(source, planted_global(3, p=2).problem)
-    result = run(source, target)
-    assert result.returncode == 1
+    result = run(source, target, code=1)
     assert "bilateral constraints" in result.stderr
     assert len(result.stderr.splitlines()) == 1
     assert not target.exists()
@@ -404,8 +399,7 @@ def test_many_files_into_a_folder(tmp_path: Path, bad: dict[str, Path]) -> None:
         fclib.write_siconos(texts[-1], planted_local(seed).problem)
     missing = tmp_path / "missing.dat"
     folder = tmp_path / "new" / "folder"
-    result = run("--json", "--out", folder, texts[0], *bad.values(), missing, *texts[1:])
-    assert result.returncode == 1
+    result = run("--json", "--out", folder, texts[0], *bad.values(), missing, *texts[1:], code=1)
     lines = result.stderr.splitlines()
     assert len(lines) == len(bad) + 1
     for line, path in zip(lines, [*bad.values(), missing], strict=True):
@@ -415,7 +409,6 @@ def test_many_files_into_a_folder(tmp_path: Path, bad: dict[str, Path]) -> None:
     assert good == [str(folder / f"problem{seed}.hdf5") for seed in range(3)]
     assert sorted(path.name for path in folder.iterdir()) == [Path(path).name for path in good]
     table = run("--out", folder, "--format", "siconos", *good)
-    assert table.returncode == 0
     assert all(text.name.removesuffix(".dat") in table.stdout for text in texts)
     for seed, text in enumerate(texts):
         again = fclib.read_siconos(folder / text.name)
@@ -426,8 +419,7 @@ def test_nothing_is_replaced_unasked(tmp_path: Path) -> None:
     source, target = tmp_path / "in.dat", tmp_path / "out.hdf5"
     fclib.write_siconos(source, planted_local(1).problem)
     target.write_text("precious")
-    result = run(source, target)
-    assert result.returncode == 1
+    result = run(source, target, code=1)
     assert result.stderr == f"fclib: {target}: is there already; --force replaces it\n"
     assert target.read_text() == "precious"
     converted("--force", source, target)
@@ -447,8 +439,7 @@ def test_the_content_tells_the_format_and_kind_decides(tmp_path: Path) -> None:
     assert converted(flag, tmp_path / "a.hdf5")["becomes"] == "3DFC"
     rolling = converted("--kind", "local_rolling", flag, tmp_path / "b.hdf5")["becomes"]
     assert rolling == "R2DFC"
-    result = run("--kind", "flat", flag, tmp_path / "c.hdf5")
-    assert result.returncode == 1
+    result = run("--kind", "flat", flag, tmp_path / "c.hdf5", code=1)
     assert result.stderr.startswith(f"fclib: {flag}: kind: there is no kind 'flat'")
 
 
@@ -473,8 +464,7 @@ def test_usage_errors_are_2_and_write_nothing(arguments: list[str], tmp_path: Pa
     names["FOLDER"].mkdir()
     fclib.write(names["IN"], planted_local(1).problem)
     before = sorted(tmp_path.rglob("*"))
-    result = run(*(names.get(argument, argument) for argument in arguments))
-    assert result.returncode == 2
+    result = run(*(names.get(argument, argument) for argument in arguments), code=2)
     assert "Traceback" not in result.stderr
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -489,8 +479,7 @@ def test_an_output_that_cannot_be_written(tmp_path: Path) -> None:
         [source, tmp_path / "missing" / "out.hdf5"],
         ["--out", occupied, source],
     ):
-        result = run(*arguments)
-        assert result.returncode == 1
+        result = run(*arguments, code=1)
         assert len(result.stderr.splitlines()) == 1
         assert "cannot be written" in result.stderr
 
@@ -551,14 +540,7 @@ def siconos() -> str:
 
 def ask(siconos: str, folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     answers = folder / "answers.json"
-    result = subprocess.run(
-        [siconos, "-c", PEER, answers],
-        input=json.dumps(jobs),
-        capture_output=True,
-        text=True,
-        cwd=folder,
-    )
-    assert result.returncode == 0, result.stderr[-2000:]
+    ran(siconos, "-c", PEER, answers, input=json.dumps(jobs), cwd=folder)
     found = json.loads(answers.read_text())
     assert isinstance(found, list)
     return found

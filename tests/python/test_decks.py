@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from typer.testing import CliRunner
 
 import fclib
 import helpers_deck as write
-from fclib.cli import app
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene, polyhedron
 from fclib.scenes.shared.interaction import Course, Drive, Interaction
+from helpers_cli import invoke
 
 PUBLISHED = Path(__file__).parents[3] / "shared" / "data" / "scenes" / "lmgc90"
 G = 9.81
@@ -182,10 +181,7 @@ def test_a_bad_deck_is_refused(tmp_path: Path, change: Any, message: str) -> Non
         decks.read(path)
     assert message in str(caught.value)
     assert str(path) in str(caught.value)
-    done = CliRunner().invoke(
-        app, ["simulate", str(path), "--time-step", "1e-3", "--out", str(tmp_path / "out")]
-    )
-    assert done.exit_code == 1
+    done = invoke("simulate", path, "--time-step", "1e-3", "--out", tmp_path / "out", code=1)
     assert "Traceback" not in done.output
     assert "".join(message.split()) in "".join(done.output.split())
 
@@ -271,15 +267,13 @@ def test_what_is_not_known_is_named(tmp_path: Path) -> None:
         assert any(line.startswith(word) for line in unknown), (word, unknown)
     pytest.importorskip("mujoco")
     arguments = ["simulate", str(path), "--time-step", "1e-3", "--steps", "1", "--no-pictures"]
-    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
+    done = invoke(*arguments, "--out", tmp_path / "out")
     assert "Left out: BODIES.DAT:62" in " ".join(done.output.split())
     file = next((tmp_path / "out").rglob("*global.hdf5"))
     said = json.loads(fclib.read(file).info.description.splitlines()[-1])
     assert set(unknown) <= set(said["left_out"])
     assert said["parameters"]["sha256"]["BODIES.DAT"]
-    refused = CliRunner().invoke(app, [*arguments, "--strict", "--out", str(tmp_path / "no")])
-    assert refused.exit_code == 1
+    refused = invoke(*arguments, "--strict", "--out", tmp_path / "no", code=1)
     assert "not supported" in refused.output
 
 
@@ -300,8 +294,7 @@ def test_a_periodic_deck_on_the_command_line(tmp_path: Path) -> None:
     arguments = ["simulate", str(path), "--time-step", "1e-3", "--steps", "2", "--no-pictures"]
     for period, contacts in (([], 2), (["--period", "10.2", "10.2"], 3)):
         out = tmp_path / f"out{contacts}"
-        done = CliRunner().invoke(app, [*arguments, *period, "--out", str(out)])
-        assert done.exit_code == 0, done.output
+        invoke(*arguments, *period, "--out", out)
         problem: Any = fclib.read(next(out.rglob("*-global.hdf5")))
         assert problem.nc == contacts
         said = json.loads(problem.info.description.splitlines()[-1])
@@ -315,12 +308,10 @@ def test_options_that_are_not_for_decks(tmp_path: Path) -> None:
         (["--time-step", "1e-3", "--ground", "0.5"], "--ground is not for decks"),
         (["--time-step", "1e-3", "--law", "gap"], "--law is not for decks"),
     ):
-        done = CliRunner().invoke(app, ["simulate", str(path), *more])
-        assert done.exit_code == 2
+        done = invoke("simulate", path, *more, code=2)
         assert message in " ".join(done.output.replace("│", "").split())
     (tmp_path / "empty").mkdir()
-    done = CliRunner().invoke(app, ["simulate", str(tmp_path / "empty"), "--time-step", "1e-3"])
-    assert done.exit_code == 1
+    done = invoke("simulate", tmp_path / "empty", "--time-step", "1e-3", code=1)
     assert "is no deck of LMGC90" in " ".join(done.output.split())
 
 
@@ -615,13 +606,11 @@ def test_contacts_are_those_within_the_alert_distance(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_deck_is_told_at_once(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["simulate", str(tmp_path)])
-    assert done.exit_code == 1
+    done = invoke("simulate", tmp_path, code=1)
     assert "is no deck of LMGC90" in done.output
     assert "--time-step" not in done.output
     write.blocks(tmp_path)
-    done = CliRunner().invoke(app, ["simulate", str(tmp_path)])
-    assert done.exit_code == 2
+    done = invoke("simulate", tmp_path, code=2)
     assert "a deck does not say its step: --time-step" in done.output
 
 

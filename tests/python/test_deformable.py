@@ -23,14 +23,7 @@ from fclib.scenes.shared.solids import Bed, Block, Load, Solids
 pytest.importorskip("mujoco")
 skfem = pytest.importorskip("skfem")
 
-from fclib.simulate import (  # noqa: E402
-    DeformableModel,
-    MoreauJean,
-    NoRenderer,
-    provenance,
-    render,
-    simulate,
-)
+from fclib.simulate import DeformableModel, MoreauJean, NoRenderer, provenance, render, simulate  # noqa: E402
 from fclib.simulate.deformable import project, shapes  # noqa: E402
 
 G = 9.81  # m/s^2

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import re
-import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -16,6 +15,7 @@ import pytest
 
 import fclib
 from fclib.collections import plan
+from helpers import ran
 from helpers_browser import served
 
 pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
@@ -40,12 +40,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     other = folder.parent / "0.9.0" / "index.html"  # of an earlier version, beside it
     other.parent.mkdir()
     other.touch()
-    done = subprocess.run(
-        [sys.executable, root / "scripts/site/build.py", folder, *OPTIONS],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    done = ran(sys.executable, root / "scripts/site/build.py", folder, *OPTIONS)
     assert "WARNING" not in done.stderr
     return folder
 
@@ -157,12 +152,7 @@ def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
         assert family.title in (site / "families" / f"{name}.html").read_text()
     solvers = "".join(path.read_text() for path in (site / "solvers").glob("*.html"))
     # of a process of its own: other tests register solvers of theirs
-    found = subprocess.run(
-        [sys.executable, "-m", "fclib", "solvers", "--json"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    found = ran(sys.executable, "-m", "fclib", "solvers", "--json").stdout
     lines = map(json.loads, found.splitlines())
     entries = [line for line in lines if "absent" not in line]
     assert len(entries) > 20
@@ -216,8 +206,7 @@ def test_pages_in_a_browser(site: Path, browser: Any) -> None:
     page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
-        "request",
-        lambda r: None if r.url.startswith(("file:", "data:")) else wrong.append(r.url),
+        "request", lambda r: None if r.url.startswith(("file:", "data:")) else wrong.append(r.url)
     )
     page.set_viewport_size(PHONE)
     for path in sorted(site.rglob("*.html")):

@@ -12,7 +12,6 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import types
 from pathlib import Path
@@ -20,14 +19,14 @@ from typing import Any
 
 import pytest
 import typer
-from typer.testing import CliRunner
 
 import fclib
 from capi_library import compile_fortran, compile_program
 from doc_blocks import WORDS, Block, blocks_of, pages
 from fclib import bench
 from fclib.cli import app
-from helpers import planted_local
+from helpers import planted_local, ran
+from helpers_cli import invoke
 from helpers_report import make_store
 
 pytest.importorskip("mujoco")
@@ -133,11 +132,7 @@ def test_the_language_of_every_block_is_known() -> None:
     assert len(SHELL) > 8
 
 
-@pytest.mark.parametrize(
-    "block",
-    [b for bs in BLOCKS.values() for b in bs if b.reason],
-    ids=str,
-)
+@pytest.mark.parametrize("block", [b for bs in BLOCKS.values() for b in bs if b.reason], ids=str)
 def test_what_is_not_run_says_why(block: Block, root: Path) -> None:
     assert len(block.reason) > 10
     for name in re.findall(r"\btests/\S+\.py", block.reason):
@@ -229,8 +224,7 @@ def call(line: str) -> None:
     for word in shlex.split(line)[1:]:
         expands = "*" in word and f"'{word}'" not in line
         words += sorted(str(path) for path in Path().glob(word)) if expands else [word]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, f"{line}\n{result.output[-2000:]}\n{result.exception!r}"
+    invoke(*words)
 
 
 @pytest.mark.parametrize("page", SHELL, ids=lambda page: page.name)
@@ -300,14 +294,9 @@ def run_octave(code: str, scratch: Path) -> None:
     (scratch / "block.m").write_text(code)
     fclib.write(scratch / "problem.hdf5", planted_local(1).problem)
     programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        [octave, "--no-init-file", "block.m"],
-        cwd=scratch,
-        env=os.environ | {"PATH": programs},
-        capture_output=True,
-        text=True,
+    done = ran(
+        octave, "--no-init-file", "block.m", cwd=scratch, env=os.environ | {"PATH": programs}
     )
-    assert done.returncode == 0, done.stderr
     line = done.stdout.splitlines()[-1]
     assert line in ("6 contacts, 324 entries in W", "0 errors"), done.stdout
 
@@ -330,6 +319,5 @@ def test_blocks_in_other_languages(block: Block, scratch: Path, root: Path) -> N
         program = compile_fortran(source, scratch / "block")
     else:
         program = compile_program(source, scratch / "block")
-    done = subprocess.run([program, "problem.hdf5"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = ran(program, "problem.hdf5")
     assert done.stdout

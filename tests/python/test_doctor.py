@@ -15,6 +15,7 @@ import typer
 import fclib
 from fclib import _core, doctor, external
 from fclib.cli.doctor import command
+from helpers import ran
 
 
 def before(*folders: Path) -> str:
@@ -35,8 +36,7 @@ def pretend(folder: Path, name: str, version: str, code: str = "", package: str 
 
 def test_what_is_here() -> None:
     command = [sys.executable, "-m", "fclib", "doctor", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = ran(*command)
     findings = {one["name"]: one for one in map(json.loads, done.stdout.splitlines())}
     keys = ["part", "name", "state", "found", "purpose", "problem", "remedy"]
     assert all(list(finding) == keys for finding in findings.values())
@@ -115,7 +115,7 @@ def test_a_folder_that_takes_no_files_is_found(tmp_path: Path) -> None:
         "finding = doctor.check_work()\n"
         "print(finding.state, finding.remedy)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ran(sys.executable, "-c", code)
     assert done.stdout.startswith("broken make room")
 
 
@@ -133,18 +133,11 @@ def test_another_hdf5_is_an_error_and_not_the_end(tmp_path: Path) -> None:
     code = "import fclib\ntry:\n    fclib.read('x')\nexcept fclib.FileError as e:\n    print(e)\n"
     environment = os.environ | {"LD_PRELOAD": str(library)}
     environment.pop("HDF5_DISABLE_VERSION_CHECK", None)
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
-    )
+    done = ran(sys.executable, "-c", code, env=environment)
     assert "HDF5 9.8.7 is loaded" in done.stdout
 
-    findings = subprocess.run(
-        [sys.executable, "-c", "from fclib import doctor\nprint(*doctor.check_core(), sep='\\n')"],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=True,
-    )
+    code = "from fclib import doctor\nprint(*doctor.check_core(), sep='\\n')"
+    findings = ran(sys.executable, "-c", code, env=environment)
     assert "state='broken', found='9.8.7'" in findings.stdout
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections import Counter
 from fractions import Fraction
 from itertools import product
@@ -23,6 +21,7 @@ from fclib.analysis import _enumerate
 from fclib.analysis._data import Data
 from fclib.analysis._reactions import reactions
 from helpers import Array, dense, local_problem, planted_global, planted_local
+from helpers_cli import run
 
 some = hypothesis.settings(deadline=None, max_examples=25, derandomize=True)
 seeds = st.integers(0, 10**6)
@@ -630,8 +629,7 @@ def test_analyze_tells_how_many_solutions_there_are(tmp_path: Path) -> None:
     several, none = tmp_path / "several.hdf5", tmp_path / "none.hdf5"
     fclib.write(several, klarbring(2.0, (1.0, 3.5)))
     fclib.write(none, sliding(rod(2.0, np.arctan(2.0), (0, 0, 0)), -1.0))
-    command = [sys.executable, "-m", "fclib", "analyze", "--json", str(several), str(none)]
-    lines = subprocess.run(command, capture_output=True, text=True).stdout.splitlines()
+    lines = run("analyze", "--json", several, none).stdout.splitlines()
     first, second = map(json.loads, lines)
     assert first["uniqueness"] == "not unique"
     assert first["isolated_solutions"] == 3

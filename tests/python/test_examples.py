@@ -3,13 +3,13 @@
 import os
 import re
 import sqlite3
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 import fclib
+from helpers import ran
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -18,14 +18,11 @@ imread = pytest.importorskip("matplotlib.image").imread
 
 def run(root: Path, folder: Path, script: str, *arguments: object) -> str:
     command = [sys.executable, str(root / "examples/python" / script), *map(str, arguments)]
-    done: subprocess.CompletedProcess[str] = subprocess.run(
-        command,
+    done = ran(
+        *command,
         cwd=folder,
         env=os.environ | {"MPLBACKEND": "Agg", "FCLIB_CACHE": str(folder / "cache")},
-        capture_output=True,
-        text=True,
     )
-    assert done.returncode == 0, done.stderr
     return done.stdout
 
 

@@ -24,7 +24,8 @@ from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
 from fclib.bench.fingerprint import version_of
 from fclib.external import command, siconos
-from helpers import local_problem, planted_global, planted_local, planted_rolling
+from helpers import converged, local_problem, planted_global, planted_local, planted_rolling, ran
+from helpers_cli import run
 
 DOCS = "docs/solvers-of-your-own.md"
 
@@ -298,13 +299,7 @@ def test_entry_points_are_found(tmp_path: Path) -> None:
         print(entry.origin, entry.title)
         """
     )
-    run = subprocess.run(
-        [sys.executable, "-c", script],
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    run = ran(sys.executable, "-c", script, env=os.environ | {"PYTHONPATH": str(tmp_path)})
     assert run.stdout.splitlines() == ["converged", "a_contact_package Comes with a package."]
     assert "broken" in run.stderr  # is said, and stops nothing
 
@@ -319,9 +314,7 @@ def test_the_documented_solver_is_the_example_and_runs(root: Path, tmp_path: Pat
     assert code in example.read_text()
     path = tmp_path / "problem.hdf5"
     fclib.write(path, problem_of())
-    run = subprocess.run(
-        [sys.executable, str(example), str(path)], capture_output=True, text=True, check=True
-    )
+    run = ran(sys.executable, example, path)
     assert "Result my-pgs: converged" in run.stdout
     assert "Result auto: converged" in run.stdout
 
@@ -349,8 +342,7 @@ def test_a_program_solves(tmp_path: Path) -> None:
         """,
     )
     for case in (planted_local(1, nc=3), planted_global(2, d=2, nc=3, p=2)):
-        result = fclib.solve(case.problem, solver, tol=1e-8, history=True)
-        assert result.status == "converged"
+        result = converged(case.problem, solver, tol=1e-8, history=True)
         assert result.solver == solver
         assert result.error <= 1e-8
         assert result.cpu_s > 0.01
@@ -371,13 +363,8 @@ def test_a_program_may_write_into_its_input(tmp_path: Path) -> None:
     assert fclib.solve(problem_of(), solver, 1e-6).converged
     path = tmp_path / "problem.hdf5"
     fclib.write(path, problem_of())
-    run = subprocess.run(
-        [sys.executable, "-m", "fclib", "solve", "--solver", solver, str(path)],
-        capture_output=True,
-        text=True,
-    )
-    assert run.returncode == 0, run.stderr
-    assert "converged" in run.stdout
+    done = run("solve", "--solver", solver, path)
+    assert "converged" in done.stdout
 
 
 def is_running(pid: int) -> bool:
@@ -482,10 +469,8 @@ def test_the_program_in_c(root: Path, tmp_path: Path, d: int) -> None:
     solver = compile_program(root / "examples" / "c" / "pgs.c", tmp_path / "pgs", "-lm")
     for case in (planted_local(3, d=d, nc=5), planted_global(4, d=d, nc=3, p=2)):
         name = f"cmd:{solver} {{input}} {{tol}}"
-        result = fclib.solve(case.problem, name, 1e-8, time_limit=20)
-        assert result.status == "converged"
-        guessed = fclib.solve(case.problem, name, 1e-8, guess=fclib.Solution(r=result.solution.r))
-        assert guessed.converged
+        result = converged(case.problem, name, 1e-8, time_limit=20)
+        converged(case.problem, name, 1e-8, guess=fclib.Solution(r=result.solution.r))
 
 
 # ---- other packages
@@ -519,8 +504,7 @@ def test_external_solvers_solve_what_is_easy(name: str) -> None:
             continue
         assert slides.converged
         for case in (planted_local(3, d=d, nc=10), planted_global(3, d=d, nc=5, p=2)):
-            result = fclib.solve(case.problem, name, 1e-7, time_limit=20)
-            assert result.status == "converged"
+            result = converged(case.problem, name, 1e-7, time_limit=20)
             assert result.error == fclib.merit(case.problem, result.solution).error
             assert result.cpu_s > 0
             guessed = fclib.solve(case.problem, name, 1e-5, guess=result.solution)
@@ -725,8 +709,7 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
         def hear(iteration: int, error: float, seconds: float, stage: str, to: Any = seen) -> None:
             to.append(error)
 
-        result = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", callback=hear)
-        assert result.status == "converged"
+        result = converged(problem, f"plugin:{shared_objects}/lib{name}.so", callback=hear)
         assert fclib.merit(problem, result.solution).error <= 1e-8
         assert len(seen) == result.iterations + 1 > 1
     limited = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", tol=0, max_iterations=3)
@@ -784,8 +767,7 @@ def test_a_shared_object_has_options(shared_objects: Path) -> None:
 def test_a_shared_object_solves_rolling_problems(shared_objects: Path, d: int) -> None:
     problem, _ = planted_rolling(d, 3, nc=4)
     name = f"plugin:{shared_objects}/libpgs.so"
-    result = fclib.solve(problem, name, step=0.4)
-    assert result.status == "converged"
+    result = converged(problem, name, step=0.4)
     assert fclib.merit(problem, result.solution).error <= 1e-8
     assert fclib.solve(problem, name, step=0.2).iterations > result.iterations
 
@@ -793,13 +775,8 @@ def test_a_shared_object_solves_rolling_problems(shared_objects: Path, d: int) -
 def test_shared_objects_from_c(shared_objects: Path, tmp_path: Path) -> None:
     fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
     program = compile_program(ROOT / "tests/capi/plugin.c", tmp_path / "plugin")
-    done = subprocess.run(
-        [program, tmp_path / "a.hdf5", f"plugin:{shared_objects}/libpgs.so"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(program, tmp_path / "a.hdf5", f"plugin:{shared_objects}/libpgs.so", timeout=60)
+    assert done.stderr == ""
 
 
 def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
@@ -844,15 +821,7 @@ def test_a_shared_object_whose_description_throws(shared_objects: Path) -> None:
 
 def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -> None:
     fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "fclib", "bench", "--problems", "a.hdf5"),
-            *("--solver", f"plugin:{shared_objects}/libpgs.so step=0.9", "--store", "store.db"),
-        ],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-    )
-    assert done.returncode == 0, done.stderr + done.stdout
+    words = ("-m", "fclib", "bench", "--problems", "a.hdf5", "--store", "store.db", "--solver")
+    ran(sys.executable, *words, f"plugin:{shared_objects}/libpgs.so step=0.9", cwd=tmp_path)
     with sqlite3.connect(tmp_path / "store.db") as store:
         assert store.execute("select status from runs").fetchall() == [("converged",)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import planted_local
+from helpers import converged, planted_local
 
 TOLERANCE = 1e-7
 
@@ -52,8 +52,7 @@ def test_pinocchio_is_called_as_by_hand(which: str, seed: int) -> None:
     except fclib.OptionError as absent:
         pytest.skip(str(absent))
     problem = planted_local(seed, d=3, nc=40).problem
-    result = fclib.solve(problem, name, TOLERANCE)
-    assert result.converged
+    result = converged(problem, name, TOLERANCE)
     # where its tolerances do not mean the same, it is run again with tighter ones
     tolerance = TOLERANCE
     while True:

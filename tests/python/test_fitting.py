@@ -14,6 +14,7 @@ from fclib.scenes import assemblies
 from fclib.scenes.capstan import NODES, TURNS, Capstan, nodes_of
 from fclib.scenes.peg_in_hole import PITCH, PegInHole
 from fclib.scenes.shared import assembly
+from helpers import converged
 
 
 def facts(problem: Any) -> dict[str, Any]:
@@ -97,8 +98,7 @@ def test_planted_rest_of_one_pin_is_a_solution() -> None:
 def test_free_connector_slides_in_and_friction_slows_it() -> None:
     own = PegInHole()
     problem = own.of_pins(2, 3.0, 0.5, np.zeros(4))
-    result = fclib.solve(problem, tol=1e-9)
-    assert result.converged
+    result = converged(problem, tol=1e-9)
     r = np.reshape(result.solution.r, (-1, 3))
     lifted = problem.H[2] @ result.solution.r
     assert result.solution.v is not None
@@ -155,8 +155,7 @@ def test_tensions_in_a_series_hold_the_cable_up_to_the_limit(turns: float, of_a_
 
 
 def test_cable_that_starts_at_rest_is_solved() -> None:
-    result = fclib.solve(Capstan().wound(0.5, 24, 0.5, rest(0.5, 24)), max_iterations=1000)
-    assert result.converged
+    converged(Capstan().wound(0.5, 24, 0.5, rest(0.5, 24)), max_iterations=1000)
 
 
 def test_limit_is_that_of_euler_and_eytelwein() -> None:
@@ -172,8 +171,7 @@ def test_limit_is_that_of_euler_and_eytelwein() -> None:
 def test_cable_stops_below_the_limit_and_slides_beyond(number: int) -> None:
     own = Capstan()
     problem = own.problem(number)
-    result = fclib.solve(problem, tol=1e-9)
-    assert result.converged
+    result = converged(problem, tol=1e-9)
     known = facts(problem)
     assert result.solution.v is not None
     speed = np.abs(result.solution.v).max()
@@ -192,8 +190,7 @@ def test_lambda_is_the_tension() -> None:
     """Half a turn without friction: the tension is the same all along, but for the vibration."""
     own = Capstan(mu=0.0)
     start = own.vibration * np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, (13, 3))
-    result = fclib.solve(own.wound(0.5, 24, 1.0, start), tol=1e-10)
-    assert result.converged
+    result = converged(own.wound(0.5, 24, 1.0, start), tol=1e-10)
     assert result.solution.l is not None
     np.testing.assert_allclose(result.solution.l, -own.held * assembly.STEP, rtol=0.02)
 

@@ -87,11 +87,7 @@ def test_what_we_write(
     info = fclib.ProblemInfo(title="Stapel, höher", description="two\nlines")
     guesses = [case.solution] * (seed % 3)
     fclib.write(
-        path,
-        case.problem.replace(info=info),
-        case.solution,
-        guesses=guesses,
-        compression=level,
+        path, case.problem.replace(info=info), case.solution, guesses=guesses, compression=level
     )
     problems, solution, read_guesses = reader(path)
     assert [*problems, "solution", *(["guesses"] if guesses else [])] == fclib.contents(path)

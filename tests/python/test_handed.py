@@ -7,7 +7,6 @@ import io
 import math
 import shutil
 import signal
-import subprocess
 import threading
 from multiprocessing import Pipe
 from pathlib import Path
@@ -25,7 +24,7 @@ from fclib.collections.verify import verify
 from fclib.external import siconos
 from fclib.recorders import _siconos
 from fclib.scenes import Scene
-from helpers import dense, needs_siconos_mechanics
+from helpers import dense, needs_siconos_mechanics, ran
 from workshop.sets import _rt444_scenes, rt444_states
 
 H, THETA, GRAVITY, MU = 1e-3, 0.6, 9.81, 0.4
@@ -254,10 +253,7 @@ def test_problems_of_what_siconos_tells_are_its_own(tmp_path: Path) -> None:
     script = tmp_path / "planks.py"
     script.write_text(PLANKS, encoding="utf-8")
     command = [siconos.python(), str(_siconos.STEPS), str(tmp_path), "3", str(script)]
-    done = subprocess.run(
-        [*command, str(tmp_path / "scene.hdf5")], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    ran(*command, tmp_path / "scene.hdf5")
     two = spinning = 0
     equal = []
     files = sorted(tmp_path.glob("*.npz"))

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 import fclib
 from fclib import scenes
-from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, stored
+from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, ran, stored
 
 Draw: TypeAlias = Callable[[st.SearchStrategy[Any]], Any]
 Layout: TypeAlias = dict[str, tuple[str, tuple[int, ...]]]
@@ -73,11 +73,7 @@ def matrix_infos(draw: st.DrawFn, names: Sequence[str]) -> dict[str, fclib.Matri
 def local_problems(draw: st.DrawFn) -> fclib.LocalProblem:
     d, nc, p = draw(st.sampled_from([2, 3])), draw(st.integers(0, 4)), draw(st.integers(0, 3))
     m = d * nc
-    mixed = {
-        "V": draw_matrix(draw, m, p),
-        "R": draw_matrix(draw, p, p),
-        "s": draw_vector(draw, p),
-    }
+    mixed = {"V": draw_matrix(draw, m, p), "R": draw_matrix(draw, p, p), "s": draw_vector(draw, p)}
     return fclib.LocalProblem(
         spacedim=d,
         W=draw_matrix(draw, m, m),
@@ -332,12 +328,7 @@ def test_layout_of_a_global_file_is_triplets_rows_in_i(tmp_path: Path) -> None:
     path = tmp_path / "global.hdf5"
     H = np.array([[0.0, 2, 0], [0, 0, 5]])
     problem = fclib.GlobalProblem(
-        M=np.diag([1.0, 2]),
-        H=sp.csc_array(H),
-        f=np.ones(2),
-        w=np.zeros(3),
-        mu=[0.5],
-        info=INFO,
+        M=np.diag([1.0, 2]), H=sp.csc_array(H), f=np.ones(2), w=np.zeros(3), mu=[0.5], info=INFO
     )
     fclib.write(path, problem, fclib.Solution(v=np.ones(2), u=np.ones(3), r=np.zeros(3)))
     assert tree(path) == {
@@ -800,8 +791,7 @@ def test_a_disk_that_fills_up_leaves_the_old_file(written: Path) -> None:
     assert resource.RLIMIT_FSIZE >= 0
     path = written / "p.hdf5"
     before = path.read_bytes()
-    run = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    run = ran(sys.executable, "-c", code, path)
     assert run.stdout.startswith(str(path))
     assert path.read_bytes() == before
     assert names_in(written) == ["p.hdf5"]
@@ -868,10 +858,7 @@ def test_what_is_no_file_is_neither_read_nor_replaced(fifo: Path, call: str) -> 
         f"try:\n    fclib.{call}\n"
         "except fclib.FileError as error:\n    print(error)\n"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", code, fifo], capture_output=True, text=True, timeout=300
-    )
-    assert run.returncode == 0, run.stderr
+    run = ran(sys.executable, "-c", code, fifo, timeout=300)
     assert str(fifo) in run.stdout
     assert fifo.is_fifo()
 
@@ -1032,10 +1019,8 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     apart = ["unshare", "--mount", "--map-root-user"]
     if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
         pytest.skip("no file system can be mounted")
-    run = subprocess.run(
-        [*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path], capture_output=True, text=True
-    )
-    assert (run.returncode, run.stderr) == (0, "")
+    run = ran(*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path)
+    assert run.stderr == ""
     assert run.stdout.splitlines() == [
         f"{tmp_path}/a.hdf5: cannot be written: {os.strerror(errno.ENOSPC)}",
         "160 ['a.hdf5']",

@@ -13,12 +13,11 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import recorders
-from fclib.cli import app
 from helpers import SPIN_LAWS, planted_global, planted_local, planted_spin
+from helpers_cli import invoke
 
 
 def block(mu: float = 0.5, sideways: float = 0.2) -> Any:
@@ -116,8 +115,7 @@ def test_what_cannot_be_judged_is_named(tmp_path: Path, capfd: pytest.CaptureFix
         (["mujoco"], 2, "name a script"),
         (["mujoco", str(tmp_path / "none.py")], 1, "there is no such script"),
     ):
-        done = CliRunner().invoke(app, ["judge", *words])
-        assert done.exit_code == status, done.output
+        done = invoke("judge", *words, code=status)
         assert said in done.output + capfd.readouterr().err
 
 
@@ -145,19 +143,17 @@ def test_runs_are_judged_side_by_side(tmp_path: Path) -> None:
             fclib.write(folder / f"{k}.hdf5", block(), None, [fclib.Solution(r=r)])
     page, table = tmp_path / "page.html", tmp_path / "steps.csv"
     words = ["judge", str(tmp_path / "right"), str(tmp_path / "wrong")]
-    done = CliRunner().invoke(app, [*words, "--csv", str(table)])
-    assert done.exit_code == 0, done.output
+    done = invoke(*words, "--csv", table)
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 10
     assert [float(row["cone"]) for row in rows] == pytest.approx([0.0] * 5 + [2.0] * 5)
     assert {row["auto_status"] for row in rows} == {"converged"}
-    done = CliRunner().invoke(app, [*words, "--json"])
+    done = invoke(*words, "--json")
     found = [json.loads(line) for line in done.output.splitlines()]
     assert [one["error"] < 1e-12 for one in found] == [True] * 5 + [False] * 5
     pytest.importorskip("plotly")
-    done = CliRunner().invoke(app, [*words, "--out", str(page)])
-    assert done.exit_code == 0, done.output
+    done = invoke(*words, "--out", page)
     text = page.read_text(encoding="utf-8")
     assert text.count("<h2>") == len(recorders.CRITERIA)
     assert "<script src" not in text  # the page needs no other file
@@ -174,8 +170,7 @@ def test_a_script_is_judged(tmp_path: Path) -> None:
         "data = mujoco.MjData(model)\n"
         "for _ in range(20):\n    mujoco.mj_step(model, data)\n"
     )
-    done = CliRunner().invoke(app, ["judge", "mujoco", str(script), "--every", "4"])
-    assert done.exit_code == 0, done.output
+    done = invoke("judge", "mujoco", script, "--every", "4")
     assert "slide" in done.output
     assert "dissipation" in done.output
 
@@ -196,8 +191,7 @@ def test_a_script_that_ends_its_process_is_judged(
         "data = mujoco.MjData(model)\n"
         f"mujoco.mj_step(model, data, 7)\nos._exit({status})\n"
     )
-    done = CliRunner().invoke(app, ["judge", "mujoco", str(script), "--json"])
-    assert done.exit_code == min(status, 1), done.output
+    done = invoke("judge", "mujoco", script, "--json", code=min(status, 1))
     assert said in done.output
     if not status:
         assert len(done.output.splitlines()) == 7
@@ -209,10 +203,9 @@ def test_a_sequence_is_judged_as_its_steps(tmp_path: Path) -> None:
         for _ in range(3):
             writer.append(block(), guesses=[fclib.Solution(r=RIGHT)])
     for what, count in ((tmp_path / "run.h5", 3), (tmp_path, 3), (f"{tmp_path}/run.h5#1", 1)):
-        done = CliRunner().invoke(app, ["judge", str(what), "--json"])
-        assert done.exit_code == 0, done.output
+        done = invoke("judge", what, "--json")
         assert len(done.output.splitlines()) == count
-    done = CliRunner().invoke(app, ["judge", str(tmp_path / "run.h5"), "--every", "2", "--json"])
+    done = invoke("judge", tmp_path / "run.h5", "--every", "2", "--json")
     assert len(done.output.splitlines()) == 2
 
 

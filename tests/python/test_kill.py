@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from capi_library import compile_program
+from helpers import ran
 
 KILLS = 150
 TIME_LIMIT = 600.0  # seconds for all of them, on a machine however busy
@@ -138,10 +139,7 @@ def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_pa
         left = set(tmp_path.iterdir()) - {path, *kept}
         assert len(left) <= len(kept) // 20, left
 
-    done = subprocess.run(
-        [reader], input="\n".join(map(str, kept)), capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
+    done = ran(reader, input="\n".join(map(str, kept)), timeout=300)
     found = [line.split() for line in done.stdout.splitlines()]
     assert len(found) == len(kept)
     assert {whole for _, whole, _ in found} == {"1"}

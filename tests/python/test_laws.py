@@ -12,6 +12,7 @@ import fclib
 from fclib.analysis._conventions import conventions
 from fclib.scenes import assemblies
 from fclib.scenes.shared import assembly
+from helpers import converged
 
 H = assembly.STEP
 FALL = assembly.GRAVITY * H  # what gravity gives in a step [m/s]
@@ -26,8 +27,7 @@ def facts(problem: Any) -> dict[str, Any]:
 
 
 def solved(problem: Any, tol: float = 1e-9) -> Any:
-    result = fclib.solve(problem, tol=tol)
-    assert result.converged
+    result = converged(problem, tol=tol)
     return result.solution
 
 

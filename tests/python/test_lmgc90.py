@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 import helpers_deck as write
 from fclib import recorders
-from fclib.cli import app
 from fclib.recorders import _lmgc90
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene
 from fclib.scenes.shared.recorded import jacobian
-from helpers import dense
+from helpers import converged, dense
+from helpers_cli import invoke
 
 H = 1e-3
 BALL = "RBDY3  SPHER  BLEUx"
@@ -111,8 +110,7 @@ def test_what_the_engine_does_not_take_is_named(
     path = write.blocks(tmp_path, **change)
     with pytest.raises(ValueError, match=message):
         recorded(path, 1)
-    done = CliRunner().invoke(app, ["record", "lmgc90", str(path), "--out", str(tmp_path / "out")])
-    assert done.exit_code == 1
+    done = invoke("record", "lmgc90", path, "--out", tmp_path / "out", code=1)
     assert "".join(message.split()) in "".join(done.output.split())
 
 
@@ -125,11 +123,9 @@ def test_options_of_decks_are_for_decks(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text("pass\n")
     common = ["--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, ["record", "lmgc90", str(script), "--steps", "3", *common])
-    assert done.exit_code == 1
+    done = invoke("record", "lmgc90", script, "--steps", "3", *common, code=1)
     assert "steps: only for the folder of a deck" in " ".join(done.output.split())
-    done = CliRunner().invoke(app, ["record", "pybullet", str(tmp_path), *common])
-    assert done.exit_code == 1
+    done = invoke("record", "pybullet", tmp_path, *common, code=1)
     assert "there is no such script" in " ".join(done.output.split())
 
 
@@ -184,8 +180,7 @@ def test_the_engines_reaction_gives_its_velocity(tmp_path: Path, theta: float) -
     assert said(last)["fields"]["H"] == "exact"
     assert said(last)["theta"] == theta
     assert fclib.merit(last.problem, last.guess).error < 1e-6
-    ours = fclib.solve(last.problem, tol=1e-10)
-    assert ours.converged
+    ours = converged(last.problem, tol=1e-10)
     assert ours.solution.v is not None
     np.testing.assert_allclose(ours.solution.v, last.velocity, atol=1e-7)
 
@@ -313,8 +308,7 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     script.write_text(SCRIPT)
     out = tmp_path / "out"
     command = ["record", "lmgc90", str(script), "IQS_CLB", "IQS_CLB_g0", "--every", "2"]
-    done = CliRunner().invoke(app, [*command, "--out", str(out)])
-    assert done.exit_code == 0, done.output
+    done = invoke(*command, "--out", out)
     assert "of 6 steps" in done.output
     files = sorted(out.glob("*.hdf5"))
     assert [file.stem for file in files] == [f"lmgc90-{k:06d}" for k in (0, 2, 4)]
@@ -335,16 +329,12 @@ def test_an_engine_that_ends_keeps_its_steps(tmp_path: Path) -> None:
     script = tmp_path / "fails.py"
     script.write_text(SCRIPT + "\nraise SystemExit(3)\n")
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["record", "lmgc90", str(script), "IQS_CLB", "--out", str(out)])
-    assert done.exit_code == 1
+    done = invoke("record", "lmgc90", script, "IQS_CLB", "--out", out, code=1)
     assert "ended with status 3 after 3 steps" in " ".join(done.output.split())
     assert len(list(out.glob("*.hdf5"))) == 3
     script.write_text(SCRIPT)
     out = tmp_path / "no"
-    done = CliRunner().invoke(
-        app, ["record", "lmgc90", str(script), "NO_SUCH_LAW", "--out", str(out)]
-    )
-    assert done.exit_code == 1
+    done = invoke("record", "lmgc90", script, "NO_SUCH_LAW", "--out", out, code=1)
     assert "LMGC90's engine ended with status" in " ".join(done.output.split())
     assert not out.exists()
 
@@ -356,7 +346,6 @@ def test_an_engine_that_is_missing_is_named(
     (tmp_path / "compas_lmgc90.py").write_text("raise ImportError('no engine')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     path = write.blocks(tmp_path)
-    done = CliRunner().invoke(app, ["record", "lmgc90", str(path), "--out", str(tmp_path / "out")])
-    assert done.exit_code == 1
+    done = invoke("record", "lmgc90", path, "--out", tmp_path / "out", code=1)
     assert "to record LMGC90 it needs compas_lmgc90" in " ".join(done.output.split())
     assert "pip install 'fclib[recorders]'" in " ".join(done.output.split())

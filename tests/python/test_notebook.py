@@ -6,7 +6,6 @@ import base64
 import gzip
 import html
 import re
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import pytest
 
 import fclib
 from fclib import bench
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 
 pytest.importorskip("plotly")
 pytest.importorskip("itables")
@@ -123,5 +122,5 @@ def test_without_plotly_it_says_what_to_install(tmp_path: Path) -> None:
         "fclib.solve(problem, history=True).plot()\n"
     )
     command = [sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    done = ran(*command, code=None, cwd=tmp_path)
     assert 'pip install "fclib[report]"' in done.stderr.splitlines()[-1]

@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-import subprocess
 import sys
 import zipfile
 from io import BytesIO
@@ -12,13 +11,11 @@ from pathlib import Path
 import pytest
 
 import fclib
+from helpers import ran
 
 
 def run(*command: object, **environment: str) -> str:
-    done = subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, env=os.environ | environment
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = ran(*command, env=os.environ | environment)
     return done.stdout
 
 
@@ -76,10 +73,8 @@ def test_every_command_has_a_man_page(root: Path, tmp_path: Path) -> None:
     groff = shutil.which("groff")
     if groff is not None:
         for path in tmp_path.glob("*.1"):
-            checked = subprocess.run(
-                [groff, "-man", "-ww", "-z", str(path)], capture_output=True, text=True
-            )
-            assert (checked.returncode, checked.stderr) == (0, ""), path.name
+            checked = ran(groff, "-man", "-ww", "-z", path)
+            assert checked.stderr == "", path.name
 
 
 # ---- what is said in several places

@@ -26,7 +26,7 @@ import odd_layouts
 from ball_judge import judge
 from capi_library import library_folder
 from fclib import scenes
-from helpers import dense, planted_global, planted_local, planted_spin
+from helpers import dense, planted_global, planted_local, planted_spin, ran
 
 # prints a file as JSON, every number of it; or writes a problem of known numbers
 PEER = r"""
@@ -179,10 +179,8 @@ def peer_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     config = shutil.which("pkg-config")
     if compiler is None or config is None:
         pytest.skip("there is no C compiler, or no pkg-config")
-    flags = subprocess.run(
-        [config, "--cflags", "--libs", "fclib", "hdf5"], capture_output=True, text=True
-    )
-    version = subprocess.run([config, "--modversion", "fclib"], capture_output=True, text=True)
+    flags = ran(config, "--cflags", "--libs", "fclib", "hdf5", code=None)
+    version = ran(config, "--modversion", "fclib", code=None)
     if flags.returncode or not version.stdout.startswith("3.1"):
         pytest.skip("libfclib 3.1 is not installed")
     folder = tmp_path_factory.mktemp("peer")
@@ -199,10 +197,7 @@ def peer(peer_program: Path) -> Peer:
     """Runs that program, which must succeed."""
 
     def run(*arguments: object) -> str:
-        done = subprocess.run(
-            [peer_program, *map(str, arguments)], capture_output=True, text=True, timeout=300
-        )
-        assert done.returncode == 0, done.stdout[-500:] + done.stderr[-500:]
+        done = ran(peer_program, *arguments, timeout=300)
         return done.stdout
 
     return run
@@ -288,11 +283,8 @@ def test_libfclib_reads_a_solution_of_reactions_alone(
 def test_libfclib_refuses_a_file_of_spin(peer_program: Path, tmp_path: Path, kind: str) -> None:
     problem, r = planted_spin("product", 4, 0)
     fclib.write(tmp_path / "spin.hdf5", problem, fclib.Solution(r=r))
-    done = subprocess.run(
-        [peer_program, "show", kind, tmp_path / "spin.hdf5"], capture_output=True, text=True
-    )
+    done = ran(peer_program, "show", kind, tmp_path / "spin.hdf5", code=1)
     # it ends its process with an error, as for every file without its group, and does not crash
-    assert done.returncode == 1
     assert f"fclib_{kind}" in done.stderr
 
 
@@ -621,13 +613,7 @@ def siconos(code: str, *arguments: object, needs: str = "siconos.numerics") -> s
     probe = subprocess.run([SYSTEM_PYTHON, "-c", f"import {needs}"], capture_output=True)
     if probe.returncode:
         pytest.skip(f"{SYSTEM_PYTHON} cannot import {needs}")
-    run = subprocess.run(
-        [SYSTEM_PYTHON, "-c", code, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
-    assert run.returncode == 0, run.stderr[-500:]
+    run = ran(SYSTEM_PYTHON, "-c", code, *arguments, timeout=100)
     return run.stdout
 
 
@@ -685,6 +671,5 @@ def test_problems_of_scenes_that_siconos_simulates(tmp_path: Path) -> None:
         w = dense(problem.W)
         assert np.linalg.eigvalsh(w + w.T).min() > -1e-12 * np.abs(w).max()
         assert fclib.solve(problem).converged
-    wrong = subprocess.run([*command[:-1], "towers"], capture_output=True, text=True, cwd=root)
-    assert wrong.returncode == 2
+    wrong = ran(*command[:-1], "towers", code=2, cwd=root)
     assert "KIND-BODIES-MU" in wrong.stderr

@@ -10,16 +10,15 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from fclib import bench
-from fclib.cli import app
 
 pytest.importorskip("pyarrow")
 
 from fclib import results
 from fclib.collections import set_index
 from fclib.collections.set_index import Choice
+from helpers_cli import invoke
 from workshop.tables import _results, published
 
 PLAN = {
@@ -45,9 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def said(*words: object, code: int = 0) -> str:
-    done = CliRunner().invoke(app, [str(word) for word in words])
-    assert done.exit_code == code, done.output
-    return done.output
+    return str(invoke(*words, code=code).output)
 
 
 def test_a_submission_is_judged_again(run: Path, tmp_path: Path) -> None:

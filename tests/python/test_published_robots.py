@@ -13,6 +13,7 @@ pytest.importorskip("mujoco", reason="simulates")
 
 from fclib.scenes import Scene
 from fclib.simulate import simulate
+from helpers import converged
 from workshop.sets import published_robots
 
 STEPS = 10  # of each published model: workshop/sets/published_robots.py makes 100
@@ -76,8 +77,7 @@ def test_a_robot_in_free_flight_with_joints_at_their_limits_needs_no_reaction(
 def test_what_moves_a_joint_against_its_limit_in_flight_is_no_rounding() -> None:
     moving = in_flight("0 0 -40 0 0 0", hip=-1e-6)
     problem: Any = next(iter(simulate(moving, 1))).problem
-    result = fclib.solve(problem)
-    assert result.status == "converged"
+    result = converged(problem)
     assert result.solution.r.any()
     assert fclib.merit(problem, fclib.Solution(r=np.zeros(problem.m))).error > 1e-3
 

@@ -12,17 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from fclib import bench
 from fclib.bench import calibration, machine
 from fclib.bench.calibration import Calibration, calibration_in, ratio_of
 from fclib.bench.job import Job, Record
-from fclib.cli import app
 
 pytest.importorskip("pyarrow")
 
 from fclib import results
+from helpers_cli import invoke
 from workshop.tables import two_machines
 
 PLAN = {
@@ -143,8 +142,7 @@ def test_a_campaign_goes_on_from_published_runs(tmp_path: Path) -> None:
     packed(tmp_path)
     parts = tmp_path / "parts"
     words = ["results", "unpack", str(tmp_path / "mine.sqlite"), "--in", str(parts)]
-    done = CliRunner().invoke(app, [*words, "--name", "small"])
-    assert done.exit_code == 0, done.output
+    done = invoke(*words, "--name", "small")
     assert "16 runs are new" in done.output
     more = bench.Campaign.of({**PLAN, "solvers": ["nsgs", "apgd", "ppa-nsn"]})
     progress = bench.run_campaign(more, tmp_path / "mine.sqlite")
@@ -161,8 +159,7 @@ def test_a_campaign_goes_on_from_published_runs(tmp_path: Path) -> None:
     with bench.Store(named) as opened:
         assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is not None
         assert results.pack(opened, parts, "small", "slow", results.shards(parts)) is None
-    wrong = CliRunner().invoke(app, [*words, "--name", "large"])
-    assert wrong.exit_code == 1
+    wrong = invoke(*words, "--name", "large", code=1)
     assert "large: there is no such part" in wrong.output
 
 
@@ -367,9 +364,7 @@ def test_the_commands(tmp_path: Path) -> None:
     parts = tmp_path / "parts"
 
     def said(*words: object, code: int = 0) -> str:
-        done = CliRunner().invoke(app, [str(word) for word in words])
-        assert done.exit_code == code, done.output
-        return done.output
+        return str(invoke(*words, code=code).output)
 
     options = ("--name", "small", "--in", parts, "--machine", "fast")
     part = said("results", "pack", tmp_path / "theirs.sqlite", *options).strip()
@@ -477,11 +472,10 @@ def test_a_solver_of_a_file_is_run_beside_published_ones(
         *("bench", str(campaign), "--solver", str(tmp_path / "walk_mine.py")),
         *("--with", str(part), "--store", str(tmp_path / "mine.sqlite")),
     ]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
+    done = invoke(*words)
     assert "8 published runs" in " ".join(done.output.split())
     with bench.Store(tmp_path / "mine.sqlite") as opened:
         assert {row["solver"] for row in opened.table()} == {"walk-mine"}
     for name in ("nsgs", "apgd", "walk-mine"):
         assert name in done.output
-    assert CliRunner().invoke(app, ["bench", str(campaign), "--with", str(part)]).exit_code == 2
+    invoke("bench", campaign, "--with", part, code=2)

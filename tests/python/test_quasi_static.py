@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-import fclib
 from fclib import _symmetry
 from fclib.scenes import assemblies
 from fclib.scenes.elastic_punch import ASIDE, KINDS_OF_FACE, PRESSING, STEPS, history, stiffness
 from fclib.scenes.plastic_tangent import DILATANCIES
 from fclib.scenes.shared.bricks import Block, isotropic
+from helpers import converged
 
 ROUND = 1  # of KINDS_OF_FACE, the smaller one
 FLAT = 0
@@ -77,8 +77,7 @@ def test_stiffness_is_that_of_quadrature(block: Block) -> None:
         values = np.where(corners, point, 1 - np.array(point))
         slopes = np.where(corners, 1.0, -1.0) / edges
         dN = np.stack(
-            [slopes[:, k] * np.prod(np.delete(values, k, axis=1), axis=1) for k in range(3)],
-            axis=1,
+            [slopes[:, k] * np.prod(np.delete(values, k, axis=1), axis=1) for k in range(3)], axis=1
         )
         K += np.einsum("ak,ikjl,bl->aibj", dN, C, dN).reshape(24, 24) * edges.prod() / 8
     found = stiffness(one, C).toarray()
@@ -109,8 +108,7 @@ def path(face: int) -> list[tuple[Any, Any]]:
     found = []
     for step in range(STEPS):
         problem = own.problem(face * STEPS + step)
-        result = fclib.solve(problem, tol=1e-9)
-        assert result.converged
+        result = converged(problem, tol=1e-9)
         found.append((problem, result.solution))
     return found
 
@@ -202,8 +200,7 @@ def test_holder_far_aside_drags_the_block_with_coulombs_force() -> None:
     kind, bricks = KINDS_OF_FACE[ROUND]
     before = history()[ROUND][PRESSING - 1]
     problem = own.of_step(kind, bricks, PRESSING + ASIDE - 1, before)
-    result = fclib.solve(problem, tol=1e-9)
-    assert result.converged
+    result = converged(problem, tol=1e-9)
     pressing, along, across = blocks(result.solution.r).sum(axis=0)
     assert -along == pytest.approx(own.mu * pressing, rel=5e-3)
     assert abs(across) < 1e-4 * pressing
@@ -285,8 +282,7 @@ def test_both_forms_of_the_tangent_are_asymmetric_and_have_one_solution() -> Non
                 assert _symmetry.asymmetry(matrix) > 0.05
         ends = []
         for form in (problem, local):
-            result = fclib.solve(form, tol=1e-10)
-            assert result.converged
+            result = converged(form, tol=1e-10)
             ends.append(result.solution.r)
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-5 * np.abs(ends[0]).max())
 
@@ -295,8 +291,7 @@ def test_holder_that_stays_leaves_the_stress_as_it_is() -> None:
     """Reactions are then those of the stress before: pressure and shear times area."""
     own = family("PlasticTangent", mu=2.0)
     problem = own.of_move(6, 0.0, (0.0, 0.0))
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     r = blocks(result.solution.r)
     share = np.full((7, 7), (own.edge / 6) ** 2)
     share[[0, -1]] *= 0.5

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import columns, real_folder
+from helpers import columns, ran, real_folder
 
 KINDS = ("local3d", "global3d", "local2d", "global2d", "condensed3d")
 EXACT = 1e-12
@@ -68,12 +67,7 @@ def test_sizes_are_those_of_the_index(path: Path, index: dict[str, dict[str, str
 
 def test_info_prints_the_sizes_of_the_index(index: dict[str, dict[str, str]]) -> None:
     paths = files("local3d", "global3d", "local2d", "global2d")
-    run = subprocess.run(
-        [sys.executable, "-m", "fclib", "info", "--json", *map(str, paths)],
-        capture_output=True,
-        text=True,
-    )
-    assert run.returncode == 0, run.stderr
+    run = ran(sys.executable, "-m", "fclib", "info", "--json", *paths)
     for line, path in zip(run.stdout.splitlines(), paths, strict=True):
         record, row = json.loads(line), index[name_of(path)]
         for key in ("spacedim", "n", "m", "nc", "nnz"):

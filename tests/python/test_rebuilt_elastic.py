@@ -9,13 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from fclib.collections import published, trajectory
-from helpers_elastic import (
-    bodies_of,
-    directions_and_gaps,
-    face_masses,
-    masses,
-    stiffness,
-)
+from helpers_elastic import bodies_of, directions_and_gaps, face_masses, masses, stiffness
 
 COUNT = 10  # problems of a family, or all
 EXACT = 1e-8  # of the largest entry

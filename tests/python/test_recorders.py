@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
 from fclib import recorders
-from fclib.cli import app
 from fclib.recorders import _genesis, _newton
-from helpers import dense, needs_siconos_mechanics
+from helpers import converged, dense, needs_siconos_mechanics
+from helpers_cli import invoke
 
 H = 1e-3
 DOWN = -9.81 * H
@@ -29,8 +28,7 @@ FRAME = np.eye(3)[[2, 0, 1]]  # N is up
 
 
 def solved(made: recorders.Assembled) -> Any:
-    result = fclib.solve(made.problem, tol=1e-10)
-    assert result.converged
+    result = converged(made.problem, tol=1e-10)
     return result.solution
 
 
@@ -244,8 +242,7 @@ def test_another_version_of_newton_is_named(
     script = tmp_path / "falls.py"
     script.write_text("", encoding="utf-8")
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["record", "newton", str(script), "--out", str(out)])
-    assert done.exit_code == 1
+    done = invoke("record", "newton", script, "--out", out, code=1)
     said = " ".join(done.output.split())
     assert "newton 1.9.2 is installed" in said
     assert "newton==1.8.*" in said
@@ -1026,8 +1023,7 @@ def test_a_script_of_newton_is_recorded(tmp_path: Path) -> None:
     script.write_text(NEWTON, encoding="utf-8")
     out = tmp_path / "out"
     common = ["record", "newton", str(script), "11", "--every", "5", "--out", str(out)]
-    done = CliRunner().invoke(app, common)
-    assert done.exit_code == 0, done.output
+    done = invoke(*common)
     assert "3 of 11 steps" in done.output
     files = sorted(out.glob("*.hdf5"))
     assert [path.stem for path in files] == [f"newton-{k:06d}" for k in (0, 5, 10)]
@@ -1059,8 +1055,7 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     out = tmp_path / "out"
     common = ["record", "pybullet", str(script), "11", "--every", "5", "--out", str(out)]
     before = list(sys.argv), list(sys.path)
-    done = CliRunner().invoke(app, common)
-    assert done.exit_code == 0, done.output
+    done = invoke(*common)
     assert "of 11 steps" in done.output
     files = sorted(out.glob("*.hdf5"))
     assert [path.stem for path in files] == [f"pybullet-{k:06d}" for k in (0, 5, 10)]
@@ -1068,8 +1063,7 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     assert problem.nc == 1
     assert len(fclib.read_guesses(files[-1])) == 1
     assert (list(sys.argv), list(sys.path)) == before
-    again = CliRunner().invoke(app, common)
-    assert again.exit_code == 1
+    again = invoke(*common, code=1)
     assert "has steps already; name another folder" in " ".join(again.output.split())
 
 
@@ -1156,8 +1150,7 @@ def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
     script.write_text(SICONOS, encoding="utf-8")
     out = tmp_path / "out"
     common = ["record", "siconos", str(script), *LOCAL, "12", "--every", "5", "--out", str(out)]
-    done = CliRunner().invoke(app, common)
-    assert done.exit_code == 0, done.output
+    done = invoke(*common)
     assert "3 of 12 steps" in done.output
     files = sorted(out.glob("*.hdf5"))
     assert [path.stem for path in files] == [f"siconos-{k:06d}" for k in (0, 5, 10)]
@@ -1234,8 +1227,7 @@ def test_a_script_of_siconos_that_fails_keeps_its_steps(tmp_path: Path) -> None:
     script.write_text(SICONOS, encoding="utf-8")
     out = tmp_path / "out"
     arguments = ["record", "siconos", str(script), *LOCAL, "3", "--out", str(out)]
-    done = CliRunner().invoke(app, [*arguments, "--", "fail"])
-    assert done.exit_code == 1
+    done = invoke(*arguments, "--", "fail", code=1)
     assert "ended with status 3" in " ".join(done.output.split())
     assert len(list(out.glob("*.hdf5"))) == 3
 
@@ -1249,8 +1241,7 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
         ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):
-        done = CliRunner().invoke(app, ["record", *arguments, "--out", str(tmp_path / "out")])
-        assert done.exit_code == 1
+        done = invoke("record", *arguments, "--out", tmp_path / "out", code=1)
         assert message in " ".join(done.output.split())
     assert not (tmp_path / "out").exists()
 
@@ -1261,8 +1252,7 @@ def test_an_engine_that_is_missing_is_named(
     (tmp_path / "script.py").write_text("import nothing_of_this_name\n")
     monkeypatch.setitem(sys.modules, "pybullet", None)
     arguments = ["record", "pybullet", str(tmp_path / "script.py"), "--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, arguments)
-    assert done.exit_code == 1
+    done = invoke(*arguments, code=1)
     said = " ".join(done.output.split())
     assert "pybullet is not installed; install it with: pip install 'fclib[recorders]'" in said
 
@@ -1367,8 +1357,7 @@ def test_the_moment_that_brakes_a_top_is_recorded(
     assert step.guess is not None
     r = step.guess.r[:d]
     assert r[0] == pytest.approx(2 * 9.81 * 0.002, rel=1e-3)
-    result = fclib.solve(problem, tol=1e-10)
-    assert result.converged
+    result = converged(problem, tol=1e-10)
     assert result.solution.r[0] == pytest.approx(r[0], rel=1e-3)
     if kind == "global_spin":
         assert problem.mu_s[0] == 0.02
@@ -1476,10 +1465,7 @@ def test_a_script_of_mujoco_is_recorded(tmp_path: Path) -> None:
         "mujoco.mj_step(model, data)\nmj_step(model, data, nstep=9)\nprint(data.time)\n"
     )
     before = mujoco.mj_step
-    done = CliRunner().invoke(
-        app, ["record", "mujoco", str(script), "--out", str(tmp_path / "out"), "--every", "5"]
-    )
-    assert done.exit_code == 0, done.output
+    done = invoke("record", "mujoco", script, "--out", tmp_path / "out", "--every", "5")
     assert "2 of 10 steps" in done.output
     assert mujoco.mj_step is before
     files = sorted((tmp_path / "out").glob("*.hdf5"))
@@ -1506,10 +1492,9 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
     script, path = tmp_path / "drop.py", tmp_path / "new" / "run.h5"
     script.write_text(SPHERE % "" + "mujoco.mj_step(model, data, 12)\n")
     words = ["record", "mujoco", str(script), "--every", "3"]
-    done = CliRunner().invoke(app, [*words, "--out", str(path)])
-    assert done.exit_code == 0, done.output
+    done = invoke(*words, "--out", path)
     assert "4 of 12 steps" in done.output
-    CliRunner().invoke(app, [*words, "--out", str(tmp_path / "files")])
+    invoke(*words, "--out", tmp_path / "files")
     steps, files = fclib.Sequence(path), sorted((tmp_path / "files").iterdir())
     assert len(steps) == len(files) == 4
     for k, file in enumerate(files):
@@ -1518,8 +1503,7 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
         (guess,), (same,) = steps.guesses(k), fclib.read_guesses(file)
         assert (guess.r == same.r).all()
     before = path.read_bytes()
-    done = CliRunner().invoke(app, [*words, "--out", str(path)])
-    assert done.exit_code == 1
+    done = invoke(*words, "--out", path, code=1)
     assert "is there already; name another file" in " ".join(done.output.split())
     assert path.read_bytes() == before
 
@@ -1538,12 +1522,7 @@ def test_a_script_is_recorded_into_a_sequence(tmp_path: Path) -> None:
     ],
 )
 def test_a_step_that_cannot_be_recorded_is_left_out(
-    more: str,
-    text: str,
-    count: int,
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    more: str, text: str, count: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings into a file there
@@ -1554,8 +1533,7 @@ def test_a_step_that_cannot_be_recorded_is_left_out(
         + (text or "mujoco.mj_step(model, data, 200)\n")
         + "print(f'it ran to its end, with {data.time:.3f} s')\n"
     )
-    done = CliRunner().invoke(app, ["record", "mujoco", str(script), "--out", str(path)])
-    assert done.exit_code == 0, done.output
+    done = invoke("record", "mujoco", script, "--out", path)
     assert "it ran to its end, with" in done.output
     assert said in " ".join(done.output.split())
     left = re.search(r"(\d+) of (\d+) steps", done.output)
@@ -1640,8 +1618,7 @@ def test_scripts_end_as_they_like(
         "step = lambda n: mujoco.mj_step(model, data, n)\n" + text
     )
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, ["record", "mujoco", "script.py", "--out", "out"])
-    assert done.exit_code == status, done.output
+    done = invoke("record", "mujoco", "script.py", "--out", "out", code=status)
     assert said in " ".join(done.output.split())
     if said.endswith("steps"):
         assert len(list((tmp_path / "out").glob("*.hdf5"))) == int(said[0])

@@ -10,19 +10,14 @@ from pathlib import Path
 import pytest
 
 import fclib
-from helpers import planted_local
+from helpers import planted_local, ran
 from helpers_report import make_collection
 
 pytest.importorskip("pyarrow")
 
 
 def table(folder: Path, root: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "workshop.tables.references", str(folder)],
-        cwd=root,
-        capture_output=True,
-        text=True,
-    )
+    return ran(sys.executable, "-m", "workshop.tables.references", folder, code=None, cwd=root)
 
 
 def test_it_tells_where_check_and_verify_differ(tmp_path: Path, root: Path) -> None:

@@ -253,8 +253,7 @@ def test_without_the_packages_it_is_said_what_to_install(
     assert (tmp_path / "site" / "assets" / "plotly.js").is_file()
     assert [path.name for path in tmp_path.iterdir()] == ["site"]
     file = sorted(collection.rglob("*-local.hdf5"))[-1]
-    done = invoke("view", file, "--out", tmp_path / "v.html")
-    assert done.exit_code == 1
+    invoke("view", file, "--out", tmp_path / "v.html", code=1)
     assert not (tmp_path / "v.html").exists()
 
 
@@ -606,24 +605,21 @@ def test_views_of_any_problem(kind: str, tmp_path: Path) -> None:
 
 def test_report_by_the_command_line(store: Path, collection: Path, tmp_path: Path) -> None:
     done = invoke("report", store, "--catalog", collection, "--out", tmp_path / "s", "--views", 1)
-    assert done.exit_code == 0, done.output
     assert "1 view," in done.output
     assert (tmp_path / "s" / "index.html").is_file()
-    assert invoke("report").exit_code == 2
-    assert invoke("report", "--pdf", "--catalog", collection).exit_code == 2
-    missing = invoke("report", tmp_path / "none.sqlite")
-    assert missing.exit_code == 1
-    assert invoke("report", "--catalog", tmp_path).exit_code == 1
+    invoke("report", code=2)
+    invoke("report", "--pdf", "--catalog", collection, code=2)
+    invoke("report", tmp_path / "none.sqlite", code=1)
+    invoke("report", "--catalog", tmp_path, code=1)
 
 
 def test_view_by_the_command_line(
     collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = sorted(collection.rglob("*-local.hdf5"))[-1]
-    done = invoke("view", file, "--out", tmp_path / "v.html")
-    assert done.exit_code == 0, done.output
+    invoke("view", file, "--out", tmp_path / "v.html")
     assert (tmp_path / "v.html").stat().st_size > 10_000
-    assert invoke("view", tmp_path / "none.hdf5").exit_code == 1
+    invoke("view", tmp_path / "none.hdf5", code=1)
     opened: list[str] = []
 
     def open_page(address: str) -> bool:
@@ -632,7 +628,7 @@ def test_view_by_the_command_line(
 
     monkeypatch.setattr("webbrowser.open", open_page)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert invoke("view", file).exit_code == 0
+    invoke("view", file)
     (address,) = opened
     assert address.startswith("file:")
     assert address.endswith(f"{file.stem}.html")
@@ -640,8 +636,7 @@ def test_view_by_the_command_line(
 
 def test_figures_for_a_paper(store: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    done = invoke("report", store, "--pdf", "--out", tmp_path / "paper")
-    assert done.exit_code == 0, done.output
+    invoke("report", store, "--pdf", "--out", tmp_path / "paper")
     for tol in TOLERANCES:
         folder = tmp_path / "paper" / f"tol-{tol:g}"
         assert (folder / "performance-cpu_s.pdf").read_bytes().startswith(b"%PDF")

@@ -15,23 +15,9 @@ from fclib.bench import profiles
 from fclib.collections import set_index, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers import planted_global
-from helpers_browser import (
-    DESK,
-    PHONE,
-    Opener,
-    check_accessible,
-    colours,
-    press_all,
-    served,
-    turn,
-)
-from helpers_report import (
-    LABELS,
-    make_collection,
-    periodic_step,
-    read_data,
-    skip_without_libraries,
-)
+from helpers_browser import DESK, PHONE, Opener, check_accessible, colours, press_all, served, turn
+from helpers_cli import invoke
+from helpers_report import LABELS, make_collection, periodic_step, read_data, skip_without_libraries
 from workshop.tables import report_size
 
 pytest.importorskip("mujoco")
@@ -654,9 +640,10 @@ def test_the_browser_draws_what_the_files_say(go: Opener) -> None:
         drawn = page.evaluate(
             "solids => solids.kind.map((_, k) => Fclib.corners(solids, k))", record_of(solids)
         )
+        size = solids.size  # looks at all shapes
         for shape, corners in enumerate(drawn):
             apart = np.abs(np.array(corners) - solids.world(shape)).max()
-            assert apart < 1e-6 * max(solids.size, solids.reach(shape)), (family, shape)
+            assert apart < 1e-6 * max(size, solids.reach(shape)), (family, shape)
     assert {0, 1, 2, 3, 4, 5, 6} <= kinds
 
 
@@ -750,10 +737,7 @@ def test_a_selection_is_fetched_by_its_list(
     chosen: str, opening: Any, masonry: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The list that the catalogue saves, and the page's own command, on a served site."""
-    from typer.testing import CliRunner
-
     from fclib import collections
-    from fclib.cli import app
 
     go = opening(masonry)
     page = go(SELECTIONS[chosen])
@@ -776,8 +760,7 @@ def test_a_selection_is_fetched_by_its_list(
         for out, place in places.items():
             known = {"URL": str(place), "collection": out}
             words = ["collection", *(known.get(word, word) for word in line.split()[2:])]
-            done = CliRunner().invoke(app, words)
-            assert done.exit_code == 0, done.output
+            invoke(*words)
     files = [sorted(p.relative_to(out) for p in Path(out).rglob("*.hdf5")) for out in places]
     assert files[0] == files[1] == files[2]
     rows = {row["id"]: row for row in collections.read_catalog("collection").to_pylist()}

@@ -19,7 +19,6 @@ import h5py
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from typer.testing import CliRunner
 
 import browser_module
 import fclib
@@ -28,13 +27,13 @@ from capi_library import HEADERS, ROOT, compiler, library_folder
 from fclib.bench import Store, supervisor
 from fclib.bench.job import Job, Limits, Record, SolverChoice
 from fclib.bench.problems import look
-from fclib.cli import app
 from fclib.collections import catalog
 from fclib.report import Campaigns, ReportError, browser, build_site
 from fclib.report.solids import solids_of
 from fclib.report.view import view_of
 from helpers import planted_global, planted_local
 from helpers_browser import chromium, served
+from helpers_cli import invoke
 from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("pyarrow")
@@ -75,25 +74,21 @@ def test_a_site_without_the_module_says_so(
     monkeypatch.setattr(browser, "BUILT", tmp_path / "none")
     out = tmp_path / "site"
     words = ["report", "--catalog", str(catalogue), "--out", str(out), "--views", "0"]
-    done = CliRunner().invoke(app, [*words, "--with-files"])
-    assert done.exit_code == 0, done.output
+    done = invoke(*words, "--with-files")
     assert "do not check and solve problems" in done.output
     assert read_data(out, "site")["module"] == 0
     assert not (out / browser.PLACE).exists()
     # what a file's solution is worth stands there in full
     first = read_data(out, "files/0")[0]["files"][0]
     assert first["merit"]["error"] < 1e-8
-    done = CliRunner().invoke(app, [*words, "--with-files", "--browser", str(tmp_path)])
-    assert done.exit_code == 1
+    done = invoke(*words, "--with-files", "--browser", tmp_path, code=1)
     assert "has no fclib.js; make wasm builds such a folder" in " ".join(done.output.split())
-    done = CliRunner().invoke(app, [*words, "--browser", str(tmp_path)])
-    assert done.exit_code == 1
+    done = invoke(*words, "--browser", tmp_path, code=1)
     assert "say --with-files" in done.output
 
 
 def test_what_is_no_site_is_not_served(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["report", "--serve", "--out", str(tmp_path)])
-    assert done.exit_code == 1
+    done = invoke("report", "--serve", "--out", tmp_path, code=1)
     assert "is no site" in done.output
 
 
@@ -627,8 +622,7 @@ def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path, mo
     # the page as a file says how to get there
     out = tmp_path / "page.html"
     words = ["view", str(file), "--out", str(out), "--browser", str(module)]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
+    invoke(*words)
     with served(tmp_path) as address, opened(window, address + out.name) as page:
         page.goto(out.as_uri())
         page.get_by_text(f"fclib view '{file}' --serve").wait_for()
@@ -641,11 +635,8 @@ def test_a_view_is_not_served_without_the_module(
     monkeypatch.setattr(browser, "BUILT", tmp_path / "none")
     file = tmp_path / "problem.hdf5"
     fclib.write(file, planted_local(1).problem)
-    done = CliRunner().invoke(app, ["view", str(file), "--serve"])
-    assert done.exit_code == 1
+    done = invoke("view", file, "--serve", code=1)
     assert "there is no module for browsers" in done.output
-    done = CliRunner().invoke(app, ["view", str(file), "--out", str(tmp_path / "page.html")])
-    assert done.exit_code == 0, done.output
+    done = invoke("view", file, "--out", tmp_path / "page.html")
     assert "--serve" not in (tmp_path / "page.html").read_text()
-    done = CliRunner().invoke(app, ["view", str(file), "--out", "page.html", "--serve"])
-    assert done.exit_code == 2
+    done = invoke("view", file, "--out", "page.html", "--serve", code=2)

@@ -43,7 +43,6 @@ def test_a_figure_has_its_caption_and_all_that_it_cites(
     done = helpers_cli.run(
         *("profile", store, "--figure", tmp_path / "sub" / "one.svg", "--curve", curve)
     )
-    assert done.returncode == 0, done.stderr
     figure, caption, entries = (
         (tmp_path / "sub" / f"one.{kind}").read_text() for kind in ("svg", "tex", "bib")
     )
@@ -158,7 +157,7 @@ def test_what_cannot_be_drawn_is_said_in_a_word(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", "")  # no TeX
-    done = helpers_cli.run("profile", store, *options)
+    done = helpers_cli.run("profile", store, *options, code=None)
     assert done.returncode != 0
     assert words in done.stderr
     assert "Traceback" not in done.stderr

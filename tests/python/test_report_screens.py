@@ -18,21 +18,8 @@ from fclib.bench import Job, Limits, Record, SolverChoice, Store
 from fclib.bench.profiles import caption as caption_of
 from fclib.collections.figures import bins_of, is_whole
 from fclib.report import Campaigns, build_site
-from helpers_browser import (
-    DESK,
-    PHONE,
-    UNFOLD,
-    Opener,
-    check_accessible,
-    colours,
-    press_all,
-    turn,
-)
-from helpers_report import (
-    made_facts,
-    read_data,
-    skip_without_libraries,
-)
+from helpers_browser import DESK, PHONE, UNFOLD, Opener, check_accessible, colours, press_all, turn
+from helpers_report import made_facts, read_data, skip_without_libraries
 
 # what they give is of one kind here
 read: Any = fclib.read

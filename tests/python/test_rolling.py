@@ -12,7 +12,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from helpers import as_global, dense
+from helpers import as_global, converged, dense
 from helpers import planted_rolling as planted
 
 Array = npt.NDArray[np.float64]
@@ -52,8 +52,7 @@ def test_every_solver_that_claims_rolling_solves_it(solver: str, d: int, seed: i
         pytest.skip(f"{solver} takes no rolling problems of spacedim {d}")
     problem, _ = planted(d, seed)
     for form in (problem, as_global(problem)):
-        result = fclib.solve(form, solver, tol=1e-9)
-        assert result.converged
+        result = converged(form, solver, tol=1e-9)
         own = fclib.Solution(r=result.solution.r)
         assert judge(problem, own).natural <= 1.1e-9
 

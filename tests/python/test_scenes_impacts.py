@@ -111,11 +111,9 @@ def test_problems_have_as_many_solutions_as_their_analysis_says() -> None:
         problem = family.problem(number)
         mu = float(problem.mu[0])
         c, s = math.cos(family.angle), math.sin(family.angle)
-        bound = (
-            (1 + 3 * c**2) / (3 * s * c),
-            math.tan(family.slope),
-            1 / family.coupling,
-        )[number // 12]
+        bound = ((1 + 3 * c**2) / (3 * s * c), math.tan(family.slope), 1 / family.coupling)[
+            number // 12
+        ]
         found = enumerate_solutions(problem).solutions
         # take-off alone; or take-off, sliding and sticking; or take-off and all locked states
         several = 2 if number // 12 == 1 else 3

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import pickle
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,7 +19,7 @@ import pytest
 import fclib
 from fclib import _core
 from fclib.scenes.packing import Packing
-from helpers import auto_chain, local_problem, planted_global, planted_local
+from helpers import auto_chain, converged, local_problem, planted_global, planted_local, ran
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -87,9 +86,7 @@ def test_a_correction_may_solve(case: tuple[fclib.LocalProblem, Array]) -> None:
     assert fclib.solve(problem, "t-answers").converged
 
 
-def test_the_callback_is_told_what_the_history_says(
-    case: tuple[fclib.LocalProblem, Array],
-) -> None:
+def test_the_callback_is_told_what_the_history_says(case: tuple[fclib.LocalProblem, Array]) -> None:
     problem, r = case
     ANSWERS[:] = off_by(r, [1e-3, 1e-4, 1e-12])
     told: list[tuple[int, float, float, str]] = []
@@ -234,10 +231,9 @@ def test_where_the_velocity_is_rounding_no_solver_is_asked() -> None:
     w = -(H.T @ (f / np.diag(M)))  # up to rounding
     ANSWERS[:] = [np.ones(3)]
     GIVEN.clear()
-    result = fclib.solve(
+    result = converged(
         fclib.GlobalProblem(spacedim=3, M=M, H=H, f=f, w=w, mu=[0.5]), "t-answers", history=True
     )
-    assert result.converged
     assert not GIVEN
     assert not result.solution.r.any()
     assert result.history is not None
@@ -318,18 +314,14 @@ first = fclib.solve(problem)
 (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")
 print(first.cpu_s, fclib.solve(problem, chain=text).setup_s)
 """
-    told = [
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        for _ in range(5)
-    ]
+    told = [ran(sys.executable, "-c", code) for _ in range(5)]
     first, reading = np.array([run.stdout.split() for run in told], dtype=float).min(axis=0)
     assert first < 0.5 * reading
 
 
 def test_a_guess_that_overflows_is_left_out() -> None:
     problem = local_problem(np.eye(3), [-1, 2, 0], [0.5])
-    result = fclib.solve(problem, guess=np.full(3, 1e300))
-    assert result.converged
+    result = converged(problem, guess=np.full(3, 1e300))
     assert all(stage.calls == 1 for stage in result.stages)
 
 

@@ -24,7 +24,7 @@ import pytest
 import fclib
 from capi_library import compile_program
 from doc_blocks import blocks_of
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 from helpers_cli import run
 
 KILLS = 60
@@ -170,8 +170,7 @@ def test_it_is_read_while_it_grows(tmp_path: Path) -> None:
         steps.refresh()
         assert len(steps) == k + 1
         assert steps[k].q[0] == -k
-        done = subprocess.run([*other, path], capture_output=True, text=True)
-        assert done.stdout == f"{k + 1}\n", done.stderr
+        assert ran(*other, path).stdout == f"{k + 1}\n"
     with h5py.File(path, swmr=True) as file:
         assert len(file["fclib_sequence/steps"]) == 3
     with pytest.raises(fclib.FileError, match="another writer has it open"):
@@ -389,10 +388,8 @@ def test_a_full_disk_leaves_the_confirmed_steps(tmp_path: Path) -> None:
     apart = ["unshare", "--mount", "--map-root-user"]
     if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
         pytest.skip("no file system can be mounted")
-    done = subprocess.run(
-        [*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path], capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = ran(*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path)
+    assert done.stderr == ""
     assert done.stdout.splitlines() == [
         f"{tmp_path}/run.h5: cannot be written: {os.strerror(errno.ENOSPC)}",
         "1",
@@ -590,8 +587,7 @@ def test_a_flipped_byte_is_told(tmp_path: Path, compression: int) -> None:
     path.write_bytes(intact)
     with h5py.File(path, "r+") as file:
         file["fclib_sequence/numbers"][5] += 1e-12
-    done = run("check", path)
-    assert done.returncode == 1
+    done = run("check", path, code=1)
     assert "steps[0]: is not as it was written: its checksum is wrong" in done.stderr
 
 
@@ -637,9 +633,7 @@ def test_c_refuses_what_would_spoil_a_step(tmp_path: Path) -> None:
     path, source = tmp_path / "run.h5", tmp_path / "twice.c"
     source.write_text(TWICE)
     program = compile_program(source, tmp_path / "twice")
-    done = subprocess.run([program, path], capture_output=True, text=True)
-    first, second, third = done.stdout.splitlines()
-    assert done.returncode == 0
+    first, second, third = ran(program, path).stdout.splitlines()
     assert "has no step yet" in first
     assert "world: is -1, but must be 0 or more" in second
     assert "/solution/u: was already given to this step" in third
@@ -685,16 +679,14 @@ def test_a_sequence_without_a_step_is_no_success(tmp_path: Path) -> None:
     record(path, 0)
     assert len(Sequence(path)) == 0
     for words in (("check", path), ("info", path), ("solve", path), ("judge", path)):
-        done = run(*words)
-        assert done.returncode == 1, words
+        done = run(*words, code=1)
         assert f"{path}: /: is a sequence in which there is no step" in done.stderr
     campaign = tmp_path / "empty.toml"
     campaign.write_text(
         'name = "empty"\nsolvers = ["auto"]\ntolerances = [1e-8]\n'
         f'[[problems]]\nfiles = ["{path}"]\n'
     )
-    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite")
-    assert done.returncode != 0
+    done = run("bench", campaign, "--store", tmp_path / "empty.sqlite", code=1)
     assert "is a sequence in which there is no step" in " ".join(done.stderr.split())
 
 
@@ -708,20 +700,20 @@ def test_commands_take_a_sequence_and_its_steps(solved: Path) -> None:
 
 def test_a_step_is_viewed(solved: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    assert run("view", f"{solved}#1", "--out", page).returncode == 0
+    run("view", f"{solved}#1", "--out", page)
     assert page.stat().st_size > 0
 
 
 def test_steps_become_files(solved: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert run("convert", solved, "--out", out).returncode == 0
+    run("convert", solved, "--out", out)
     files = sorted(out.iterdir())
     assert [file.name for file in files] == [f"run-{k:06d}.hdf5" for k in range(4)]
     for k, file in enumerate(files):
         assert read(file) == read(f"{solved}#{k}")
         assert fclib.read_solution(file) == fclib.read_solution(f"{solved}#{k}")
     one = tmp_path / "one.hdf5"
-    assert run("convert", f"{solved}#3", one).returncode == 0
+    run("convert", f"{solved}#3", one)
     assert read(one) == read(files[3])
 
 
@@ -732,14 +724,12 @@ def test_a_campaign_solves_the_steps(solved: Path, tmp_path: Path) -> None:
         f'name = "mine"\nsolvers = ["nsgs"]\ntolerances = [1e-6]\n'
         f'[[problems]]\nfiles = ["{solved}"]\n'
     )
-    done = run("bench", campaign, "--store", store)
-    assert done.returncode == 0, done.stderr
+    run("bench", campaign, "--store", store)
     with sqlite3.connect(store) as db:
         assert db.execute("SELECT count(*) FROM runs").fetchone() == (4,)
         rows = db.execute("SELECT name, family FROM problems ORDER BY name").fetchall()
     assert rows == [(f"run-{k:06d}", "run") for k in range(4)]
-    again = run("bench", campaign, "--store", store)
-    assert again.returncode == 0
+    run("bench", campaign, "--store", store)
 
 
 def test_a_collection_takes_steps_in(solved: Path, tmp_path: Path) -> None:
@@ -749,8 +739,7 @@ def test_a_collection_takes_steps_in(solved: Path, tmp_path: Path) -> None:
     source.mkdir()
     shutil.move(solved, source / "run.h5")
     for count in (4, 5):
-        done = run("collection", "add", source, "--out", out, "--name", "mine")
-        assert done.returncode == 0, done.stderr
+        run("collection", "add", source, "--out", out, "--name", "mine")
         files = sorted((out / "mine").rglob("*.hdf5"))
         assert len(files) == count
         # the next step is a new problem, and those that were there stay
@@ -785,11 +774,11 @@ def test_libfclib_3_1_says_that_it_reads_none(solved: Path, tmp_path: Path) -> N
     )
     program = tmp_path / "peer"
     subprocess.run(["cc", source, "-o", program, "-lfclib"], check=True)
-    done = subprocess.run([program, solved], capture_output=True, text=True, timeout=60)
+    done = ran(program, solved, code=None, timeout=60)
     assert done.returncode > 0, "it ended by a signal, or read something"
     assert "fclib_local" in done.stderr or "problem" in done.stderr, done.stderr
     plain = tmp_path / "plain.hdf5"
-    assert run("convert", f"{solved}#1", plain).returncode == 0
+    run("convert", f"{solved}#1", plain)
     assert subprocess.run([program, plain], timeout=60).returncode == 0
 
 

@@ -10,16 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from fclib._geometry import rotations
-from fclib.cli import app
 from fclib.scenes import Scene
 from fclib.scenes.shared import siconos_input
 
 pytest.importorskip("mujoco")
 
 from fclib.simulate import model_of, simulate
+from helpers_cli import invoke
 
 GROUND = "0 -1 0  0 0 -0.5  1 0 0 0  0 0 0 0 0 0"
 REFERENCE = "Box 40 40 1\nshapes/plank.vtp\nSphere .5\nCapsule 0.4 1.2\nCylinder 0.3 0.8\n"
@@ -117,17 +116,14 @@ def test_a_plank_comes_to_rest_on_the_ground(tmp_path: Path) -> None:
 def test_a_file_becomes_problems_by_one_command(tmp_path: Path) -> None:
     path = written(tmp_path / "Drop", "2 0 1  0 0 0.5001  1 0 0 0  0 0 0 0 0 0")
     command = ["simulate", str(path), "--steps", "12", "--out", str(tmp_path / "out")]
-    lacking = CliRunner().invoke(app, [*command, "--time-step", "0.002"])
-    assert lacking.exit_code == 1
+    lacking = invoke(*command, "--time-step", "0.002", code=1)
     assert "does not have the friction" in " ".join(lacking.output.split())
     more = ["--time-step", "0.002", "--friction", "0.4", "--no-pictures"]
-    done = CliRunner().invoke(app, [*command, *more])
-    assert done.exit_code == 0, done.output
+    invoke(*command, *more)
     assert len(list((tmp_path / "out").rglob("*-global.hdf5"))) > 3
     scene = tmp_path / "scene.xml"
     scene.write_text("<mujoco/>", encoding="utf-8")
-    refused = CliRunner().invoke(app, ["simulate", str(scene), "--friction", "0.4"])
-    assert refused.exit_code == 1
+    refused = invoke("simulate", scene, "--friction", "0.4", code=1)
     assert "has its own friction" in " ".join(refused.output.split())
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import fclib
-from fclib.cli import app
 from fclib.external import siconos
 from fclib.scenes import Scene
 from fclib.scenes.shared import siconos_input
-from helpers import needs_siconos_mechanics
+from helpers import needs_siconos_mechanics, ran
 
 pytest.importorskip("mujoco")
 pytest.importorskip("h5py")
@@ -24,6 +21,7 @@ import h5py
 import mujoco
 
 from fclib.simulate import model_of, simulate
+from helpers_cli import invoke
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 CORNERS = np.array([(x, y, z) for x in (-1.5, 1.5) for y in (-0.5, 0.5) for z in (-0.25, 0.25)])
@@ -228,14 +226,12 @@ def test_a_file_becomes_problems_by_one_command(tmp_path: Path) -> None:
     with begun(path) as file:
         contactor(body(file, "ball", (0, 0, 0.5001), mass=1.0), "Ball")
     command = ["simulate", str(path), "--steps", "12", "--out", str(tmp_path / "out")]
-    lacking = CliRunner().invoke(app, command)
-    assert lacking.exit_code != 0
+    lacking = invoke(*command, code=1)
     assert "does not have the time step" in lacking.output
     command += ["--time-step", "0.002", "--no-pictures"]
-    refused = CliRunner().invoke(app, [*command, "--restitution", "0.5"])
+    refused = invoke(*command, "--restitution", "0.5", code=1)
     assert "has its own restitution" in refused.output
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0, done.output
+    invoke(*command)
     files = sorted((tmp_path / "out").rglob("*-global.hdf5"))
     assert files
     problem: Any = fclib.read(files[0])
@@ -261,7 +257,7 @@ with runner.MechanicsHdf5Runner(mode="w", io_filename=sys.argv[1]) as io:
 def test_what_siconos_itself_writes_is_read(tmp_path: Path) -> None:
     needs_siconos_mechanics()
     path = tmp_path / "own.hdf5"
-    done = subprocess.run([siconos.python(), "-c", WRITES, path], capture_output=True, text=True)
+    done = ran(siconos.python(), "-c", WRITES, path, code=None)
     assert path.is_file(), done.stderr
     scene = Scene.from_file(path, time_step=1e-3)
     model: Any = model_of(scene)

@@ -788,20 +788,14 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
         (mjcf(SPHERE, more='adhesion="1"'), "adhesion"),
         (mjcf(SPHERE, more='surfacevel="1 0 0 0 0 0"'), "surfacevel"),
         (
-            mjcf(
-                ARM,
-                rest='<actuator><general joint="elbow" dyntype="user"/></actuator>',
-            ),
+            mjcf(ARM, rest='<actuator><general joint="elbow" dyntype="user"/></actuator>'),
             "states of actuators",
         ),
         (mjcf(SPHERE, more='solref="0.01 1"'), "solref"),
         (mjcf(SPHERE, more='margin="0.1" gap="0.05"'), "margins"),
         (mjcf(ARM.replace('name="elbow"', 'name="elbow" range="-1 1" margin="0.1"')), "margins"),
         (
-            mjcf(
-                ARM,
-                rest='<actuator><motor joint="elbow" delay="0.1" nsample="20"/></actuator>',
-            ),
+            mjcf(ARM, rest='<actuator><motor joint="elbow" delay="0.1" nsample="20"/></actuator>'),
             "delays",
         ),
         (

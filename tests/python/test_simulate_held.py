@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import fclib
 from fclib import _core, collections
 from fclib.scenes import Scene
 from fclib.scenes.shared.interaction import Course, Drive, Interaction
-from helpers import dense
+from helpers import dense, ran
 from helpers_cli import run as command
 from helpers_simulate import mujoco_of
 
@@ -24,21 +23,10 @@ from helpers_simulate import mujoco_of
 mujoco = pytest.importorskip("mujoco")
 
 from fclib.collections import trajectory  # noqa: E402
-from fclib.simulate import (  # noqa: E402
-    MujocoModel,
-    StoppedError,
-    UnsupportedSceneError,
-    logged,
-    simulate,
-)
+from fclib.simulate import MujocoModel, StoppedError, UnsupportedSceneError, logged, simulate  # noqa: E402
 from fclib.simulate import simulation as module  # noqa: E402
 from fclib.simulate.geometry import places_of  # noqa: E402
-from fclib.simulate.simulation import (  # noqa: E402
-    STILL,
-    carry_over,
-    same_contacts,
-    trouble,
-)
+from fclib.simulate.simulation import STILL, carry_over, same_contacts, trouble  # noqa: E402
 
 H = 0.002  # s
 
@@ -406,8 +394,7 @@ def test_what_came_before_a_stop_is_stored_and_said(tmp_path: Path) -> None:
     path = tmp_path / "runaway.xml"
     path.write_text(RUNAWAY, encoding="utf-8")
     out = tmp_path / "out"
-    result = command("simulate", path, "--steps", 500, "--out", out, "--no-pictures")
-    assert result.returncode == 1
+    result = command("simulate", path, "--steps", 500, "--out", out, "--no-pictures", code=1)
     assert "Stopped: runaway, step " in result.stderr
     assert "the steps before are stored" in result.stderr
     states = trajectory.read(out / "scenes" / "runaway" / trajectory.OWN)
@@ -707,8 +694,7 @@ def test_a_model_without_shapes_makes_problems(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     out = tmp_path / "out"
-    result = command("simulate", path, "--steps", 60, "--out", out, "--no-pictures")
-    assert result.returncode == 0, result.stderr
+    command("simulate", path, "--steps", 60, "--out", out, "--no-pictures")
     files = sorted(out.rglob("*-global.hdf5"))
     assert len(files) == 60
     problem: Any = fclib.read(files[-1])
@@ -744,9 +730,7 @@ def test_a_policy_by_its_file(tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "mine.py").write_text("def zero(time, state):\n    return [0.0]\n")
     code = "from fclib.simulate import control_of; print(control_of('sub/mine.py:zero')(0, None))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    done = ran(sys.executable, "-c", code, cwd=tmp_path)
     assert done.stdout.strip() == "[0.0]"
 
 
@@ -792,8 +776,7 @@ def test_logged_states_become_problems(kind: str, log: dict[str, Any], tmp_path:
         path.write_text(as_csv(log), encoding="utf-8")
     out = tmp_path / "out"
     scene = tmp_path / "pushed.xml"
-    done = command("simulate", scene, "--states", path, "--out", out, "--no-pictures")
-    assert done.returncode == 0, done.stderr
+    command("simulate", scene, "--states", path, "--out", out, "--no-pictures")
     states = trajectory.read(out / "scenes" / "pushed" / trajectory.OWN)
     assert states.step.tolist() == list(range(10))
     both = np.hstack((log["qpos"], log["ctrl"]))

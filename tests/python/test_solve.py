@@ -16,7 +16,7 @@ import scipy.sparse as sp
 import fclib
 from ball_judge import judge
 from fclib import _registry
-from helpers import STORAGES, dense, local_problem, planted_global, planted_local
+from helpers import STORAGES, converged, dense, local_problem, planted_global, planted_local
 
 
 def endless() -> fclib.LocalProblem:
@@ -284,8 +284,7 @@ def test_a_problem_without_a_solution_is_not_solved(limit: int) -> None:
 
 def test_the_callback_follows_the_iterations() -> None:
     history: list[tuple[int, float, float, str]] = []
-    result = fclib.solve(hard(), callback=lambda *progress: history.append(progress))
-    assert result.converged
+    result = converged(hard(), callback=lambda *progress: history.append(progress))
     iterations, errors, times, stages = zip(*history, strict=True)
     assert stages[-1] == result.stages[-1].name
     assert iterations[0] == 0
@@ -307,8 +306,7 @@ def test_the_callback_stops_the_solver() -> None:
 @pytest.mark.parametrize("answer", [False, np.False_, 0])
 def test_any_false_answer_of_the_callback_stops_the_solver(answer: Any) -> None:
     assert fclib.solve(hard(), tol=1e-14, callback=lambda *_: answer).status == "interrupted"
-    told = fclib.solve(hard(), callback=lambda *_: np.bool_(True))
-    assert told.converged
+    converged(hard(), callback=lambda *_: np.bool_(True))
 
 
 @pytest.mark.parametrize(
@@ -455,8 +453,7 @@ def test_contradicting_bilateral_constraints_are_unsuitable() -> None:
         mu=[0.5],
         b=[0, 0],
     )
-    result = fclib.solve(problem)
-    assert result.converged
+    result = converged(problem)
     assert result.solution.l is not None
     np.testing.assert_allclose(result.solution.l[0], result.solution.l[1])  # the shortest
     with pytest.raises(fclib.UnsuitableError, match=r"bilateral constraint \d: contradicts"):

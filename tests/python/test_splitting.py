@@ -9,16 +9,9 @@ import pytest
 from scipy import sparse
 
 import fclib
-from helpers import dense, local_problem, planted_local, planted_rolling
+from helpers import converged, dense, local_problem, planted_local, planted_rolling
 
-LOCAL_SOLVERS = (
-    "exact",
-    "projection",
-    "diagonal",
-    "alart-curnier",
-    "fischer-burmeister",
-    "hybrid",
-)
+LOCAL_SOLVERS = ("exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister", "hybrid")
 PROJECTIONS = ("fp-ds", "fp-vi-upk", "fp-vi-upts", "fp-eg-upk", "fp-eg-upts", "hyperplane")
 METHODS = ("nsgs", "psor", *PROJECTIONS)
 SWEEPS: list[dict[str, Any]] = [
@@ -47,10 +40,9 @@ def packing(stretch: float = 1.0) -> fclib.LocalProblem:
 def test_local_solvers_agree(method: str, local_solver: str, d: int) -> None:
     for seed in range(4):
         case = planted_local(seed, d=d)
-        result = fclib.solve(
+        result = converged(
             case.problem, method, 1e-11, local_solver=local_solver, max_iterations=20_000
         )
-        assert result.converged
         np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-8)
 
 
@@ -58,10 +50,9 @@ def test_local_solvers_agree(method: str, local_solver: str, d: int) -> None:
 @pytest.mark.parametrize("d", [3, 5])
 def test_local_solvers_take_rolling_contacts(local_solver: str, d: int) -> None:
     problem, r = planted_rolling(d, seed=2)
-    result = fclib.solve(
+    result = converged(
         problem, "nsgs", 1e-10, local_solver=local_solver, max_iterations=100_000, time_limit=20
     )
-    assert result.converged
     np.testing.assert_allclose(result.solution.r, r, atol=1e-7)
 
 
@@ -77,8 +68,7 @@ def test_newton_takes_the_sweeps_of_the_exact_solver() -> None:
 def test_orders_of_sweeping_lead_to_the_same_solution(options: dict[str, Any]) -> None:
     for seed in range(4):
         case = planted_local(seed)
-        result = fclib.solve(case.problem, "nsgs", 1e-11, **options)
-        assert result.converged
+        result = converged(case.problem, "nsgs", 1e-11, **options)
         np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-8)
 
 
@@ -120,8 +110,7 @@ def row(nc: int = 400, seed: int = 3) -> fclib.LocalProblem:
     + [("nsgs", options) for options in SWEEPS],
 )
 def test_the_number_of_threads_does_not_change_a_bit(method: str, options: dict[str, Any]) -> None:
-    two = fclib.solve(row(), method, 1e-10, threads=2, **options)
-    assert two.converged
+    two = converged(row(), method, 1e-10, threads=2, **options)
     for threads in (3, 7):
         more = fclib.solve(row(), method, 1e-10, threads=threads, **options)
         assert more.iterations == two.iterations
@@ -176,8 +165,7 @@ def test_times_of_all_threads_are_told() -> None:
 def test_projections_agree_with_the_planted_solution(method: str, d: int, metric: str) -> None:
     for seed in range(4):
         case = planted_local(seed, d=d)
-        result = fclib.solve(case.problem, method, 1e-10, metric=metric, time_limit=20)
-        assert result.converged
+        result = converged(case.problem, method, 1e-10, metric=metric, time_limit=20)
         np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-7)
 
 
@@ -185,16 +173,14 @@ def test_projections_agree_with_the_planted_solution(method: str, d: int, metric
 @pytest.mark.parametrize("d", [3, 5])
 def test_rolling_contacts(method: str, d: int) -> None:
     problem, r = planted_rolling(d, seed=1)
-    result = fclib.solve(problem, method, 1e-9, time_limit=20)
-    assert result.converged
+    result = converged(problem, method, 1e-9, time_limit=20)
     np.testing.assert_allclose(result.solution.r, r, atol=1e-6)
 
 
 @pytest.mark.parametrize("method", PROJECTIONS)
 def test_a_metric_of_each_contact_bears_unlike_masses(method: str) -> None:
     problem = packing(stretch=30)
-    own = fclib.solve(problem, method, 1e-6, time_limit=30)
-    assert own.converged
+    own = converged(problem, method, 1e-6, time_limit=30)
     same = fclib.solve(
         problem, method, 1e-6, metric="uniform", max_iterations=4 * own.iterations, time_limit=30
     )
@@ -205,8 +191,7 @@ def test_a_metric_of_each_contact_bears_unlike_masses(method: str) -> None:
 @pytest.mark.parametrize("rho", [1e-6, 1e6])
 def test_the_first_step_hardly_matters(method: str, rho: float) -> None:
     case = planted_local(3)
-    result = fclib.solve(case.problem, method, 1e-8, rho=rho)
-    assert result.converged
+    result = converged(case.problem, method, 1e-8, rho=rho)
     assert result.iterations <= 2 * fclib.solve(case.problem, method, 1e-8).iterations + 100
 
 
@@ -248,6 +233,5 @@ def test_a_better_start_takes_fewer_iterations(method: str) -> None:
     problem = packing()
     rough = fclib.solve(problem, method, 1e-4)
     cold = fclib.solve(problem, method, 1e-6)
-    warm = fclib.solve(problem, method, 1e-6, guess=rough.solution)
-    assert warm.converged
+    warm = converged(problem, method, 1e-6, guess=rough.solution)
     assert warm.iterations < cold.iterations

@@ -14,6 +14,7 @@ import pytest
 
 from capi_library import compiler, library_folder
 from doc_blocks import blocks_of, tutorials
+from helpers import ran
 
 pytest.importorskip("mujoco")
 
@@ -28,10 +29,7 @@ def c_library(target: Path) -> dict[str, str]:
     for part in ("library", "development"):
         subprocess.run([*install, part], check=True, stdout=subprocess.DEVNULL)
     (found,) = target.rglob("fclib.pc")
-    return {
-        "PKG_CONFIG_PATH": str(found.parent),
-        "LD_LIBRARY_PATH": str(found.parent.parent),
-    }
+    return {"PKG_CONFIG_PATH": str(found.parent), "LD_LIBRARY_PATH": str(found.parent.parent)}
 
 
 @pytest.mark.parametrize("page", tutorials(), ids=lambda page: page.stem)
@@ -55,9 +53,7 @@ def test_a_tutorial_works_as_it_is_written(page: Path, tmp_path: Path) -> None:
             continue
         assert block.language == "sh", f"{block}: neither a file nor commands"
         for line in block.commands():
-            done = subprocess.run(
-                ["sh", "-c", line], cwd=folder, env=environment, capture_output=True, text=True
-            )
+            done = ran("sh", "-c", line, code=None, cwd=folder, env=environment)
             said = (done.stdout + done.stderr)[-3000:]
             assert done.returncode == 0, f"{block}: {line}\n{said}"
             commands += 1

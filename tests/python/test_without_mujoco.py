@@ -12,6 +12,7 @@ from typer.main import get_command
 import fclib
 from fclib import cli, scenes
 from fclib.collections import plan
+from helpers import ran
 
 SAID = r"fclib: [^\n]*MuJoCo[^\n]*pip install 'fclib\[simulate\]'[^\n]*\n?"
 
@@ -34,7 +35,7 @@ def without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "fclib", *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return ran(*command, code=None, cwd=folder)
 
 
 def test_it_is_an_extra() -> None:
@@ -69,9 +70,7 @@ def test_a_scene_with_files_says_so_too(without: Path) -> None:
     text = '<asset><mesh name="a" file="a.obj"/></asset><worldbody>'
     (without / "scene.xml").write_text(SCENE.replace("<worldbody>", text))
     code = "from fclib import scenes; scenes.Scene.from_file('scene.xml')"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=without, capture_output=True, text=True, check=False
-    )
+    done = ran(sys.executable, "-c", code, code=None, cwd=without)
     last = done.stderr.strip().splitlines()[-1]
     assert re.fullmatch(r"ImportError: scene\.xml .*pip install 'fclib\[simulate\]'.*", last), last
 
@@ -104,10 +103,7 @@ def test_every_command_has_its_help(without: Path) -> None:
     )
     code += "assert 'mujoco' not in sys.modules\n"
     code = f"import sys; sys.path.append({str(Path(__file__).parents[1])!r})\n" + code
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=without, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    ran(sys.executable, "-c", code, cwd=without)
 
 
 def commands(command: object, words: tuple[str, ...]) -> list[tuple[str, ...]]:

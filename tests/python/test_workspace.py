@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 import fclib
 from capi_library import ROOT, compile_program
-from helpers import planted_global, planted_local
+from helpers import planted_global, planted_local, ran
 
 
 def test_the_same_again_takes_next_to_nothing() -> None:
@@ -64,17 +63,13 @@ def test_wrong_names_are_refused() -> None:
 
 def test_from_c_nothing_is_allocated_step_by_step(tmp_path: Path) -> None:
     program = compile_program(ROOT / "tests/capi/workspace.c", tmp_path / "workspace", "-lm")
-    done = subprocess.run([program], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
+    ran(program, timeout=60)
     if shutil.which("valgrind") is None:
         pytest.skip("there is no valgrind to count calls of malloc")
     calls = []
     for steps in ("5", "300"):
-        ran = subprocess.run(
-            ["valgrind", program, steps], capture_output=True, text=True, timeout=120
-        )
-        assert ran.returncode == 0, ran.stderr
-        found = re.search(r"total heap usage: ([\d,]+) allocs", ran.stderr)
+        said = ran("valgrind", program, steps, timeout=120).stderr
+        found = re.search(r"total heap usage: ([\d,]+) allocs", said)
         assert found
         calls.append(found[1])
     assert calls[0] == calls[1]

@@ -137,11 +137,7 @@ def measure(problem: Any, origin: str) -> Contact:
     sweeps = {}
     for name in LOCAL_SOLVERS:
         result = _solve.solve(
-            problem,
-            "nsgs",
-            tol=LOCAL_TOLERANCE,
-            max_iterations=SWEEPS,
-            local_solver=name,
+            problem, "nsgs", tol=LOCAL_TOLERANCE, max_iterations=SWEEPS, local_solver=name
         )
         sweeps[name] = result.iterations if result.converged else SWEEPS + 1
     return Contact(problem, origin, sweeps)

@@ -220,8 +220,7 @@ def main() -> None:
     print()
     for package, total in sums.items():
         show(
-            total,
-            f"{package}: {models[package]} models with problems, {refused[package]} refused",
+            total, f"{package}: {models[package]} models with problems, {refused[package]} refused"
         )
     everything = Tally()
     for total in sums.values():

@@ -179,13 +179,7 @@ REGIMES: dict[str, Regime] = {
         version="3",
     ),
     "KaplasTower": Regime(
-        "KaplasTower",
-        {"levels": 11},
-        keep=20,
-        steps=240,
-        way=EXACT,
-        by=("dof",),
-        fill=True,
+        "KaplasTower", {"levels": 11}, keep=20, steps=240, way=EXACT, by=("dof",), fill=True
     ),
     "CubesH8": Regime(
         "Cubes_H8_5",

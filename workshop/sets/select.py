@@ -268,9 +268,7 @@ def machines_of(path: Path) -> list[str]:
 
 
 def measured(
-    rows: Sequence[Row],
-    stores: Mapping[float, Path],
-    accepted: Iterable[ratings.Run] = (),
+    rows: Sequence[Row], stores: Mapping[float, Path], accepted: Iterable[ratings.Run] = ()
 ) -> list[dict[str, Any]]:
     """Rows with the costs of all solvers, and the least error known, from stores.
 

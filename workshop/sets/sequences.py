@@ -37,12 +37,7 @@ class Rule:
 
     def record(self) -> dict[str, Any]:
         """In JSON's types."""
-        return {
-            **vars(self),
-            "sample": SAMPLE,
-            "near": features.NEAR,
-            "sweeps": select.SWEEPS,
-        }
+        return {**vars(self), "sample": SAMPLE, "near": features.NEAR, "sweeps": select.SWEEPS}
 
 
 def window(folder: str, steps: int) -> range | None:

@@ -381,10 +381,7 @@ def slurm(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, A
     trials: Any = importlib.import_module("test_bench_cluster")
     # one job of two processes
     options = {"workers": "2", "cores": "2", "memory": "1GB", "output": "/dev/null"}
-    with (
-        trials.slurm_of_one_node(folder),
-        cluster.on_slurm(options, tell=lambda _: None) as runner,
-    ):
+    with trials.slurm_of_one_node(folder), cluster.on_slurm(options, tell=lambda _: None) as runner:
 
         def kill() -> int:
             jobs = trials.jobs_of_slurm()

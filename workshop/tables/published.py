@@ -73,7 +73,7 @@ TAKEN: Final = {
     "most half of the solvers of `candidates` solve the problems of `candidates-long`. `auto` and "
     "the solvers of `matrix` had no part in the choice. A problem was taken if some of the other "
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
-    "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
+    "who solves what, and what nobody solves. They show less well by how much `auto` is better."
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {

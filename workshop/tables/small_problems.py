@@ -140,10 +140,7 @@ def rows_of(
             for tol in tolerances:
                 guess = before if warm else None
                 runs: dict[str, tuple[int, Callable[[], tuple[float, Floats]]]] = {
-                    "PGS, by its change": (
-                        count,
-                        partial(pgs.solve, W, q, mu, start, tol, False),
-                    ),
+                    "PGS, by its change": (count, partial(pgs.solve, W, q, mu, start, tol, False)),
                     "PGS, by the error": (count, partial(pgs.solve, W, q, mu, start, tol, True)),
                     "fclib.solve_batch": (count, partial(by_batch, W, q, mu, guess, tol)),
                 }

@@ -40,10 +40,7 @@ def made(entries: int) -> dict[str, fclib.LocalProblem]:
     matrices = {"random": pattern, "two digits": again, "pattern": blocks, "band": band}
     return {
         name: fclib.LocalProblem(
-            spacedim=3,
-            W=W,
-            q=rng.standard_normal(W.shape[0]),
-            mu=np.full(W.shape[0] // 3, 0.5),
+            spacedim=3, W=W, q=rng.standard_normal(W.shape[0]), mu=np.full(W.shape[0] // 3, 0.5)
         )
         for name, W in matrices.items()
     }

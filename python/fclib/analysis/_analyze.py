@@ -272,11 +272,7 @@ class Analysis:
 # what overflows is not finite, and decides nothing
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def analyze(
-    problem: _solve.Problem,
-    *,
-    tol: float = 1e-8,
-    time_limit: float = 20.0,
-    dense: int = DENSE,
+    problem: _solve.Problem, *, tol: float = 1e-8, time_limit: float = 20.0, dense: int = DENSE
 ) -> Analysis:
     """Analyse a problem: sizes, ranks, conditioning, units, existence and uniqueness.
 
@@ -347,13 +343,7 @@ def analyze(
         reactions=Reactions(UNDECIDED, unique.reason)
         if verdict.verdict == PROVEN_NOT
         else reactions(
-            data,
-            unique.verdict,
-            unique.reactions,
-            states,
-            verdict.solution,
-            verdict.error,
-            dense,
+            data, unique.verdict, unique.reactions, states, verdict.solution, verdict.error, dense
         ),
         self_stress=self_stress(data, joints, condition, time_limit),
         enumeration=states,
@@ -443,9 +433,7 @@ def enumerated(found: Uniqueness, states: Enumeration) -> Uniqueness:
     if found.verdict == "unique" or states.velocity_unique is None:
         return found
     return replace(
-        found,
-        verdict="unique" if states.velocity_unique else "not unique",
-        reason=states.reason,
+        found, verdict="unique" if states.velocity_unique else "not unique", reason=states.reason
     )
 
 

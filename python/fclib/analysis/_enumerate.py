@@ -350,10 +350,7 @@ class _System:
             else:
                 self.parts += [[(N, one)], [(m + N, one)]]
                 self.states.append(
-                    [
-                        _State("open", (first,), first),
-                        _State("closed", (first + 1,), None),
-                    ]
+                    [_State("open", (first,), first), _State("closed", (first + 1,), None)]
                 )
         # the columns of u, with their contact and component
         self.speeds = {

@@ -365,12 +365,7 @@ def existence(
 
 
 def _contradiction(
-    data: Data,
-    joints: Joints,
-    agreed: str,
-    why: str,
-    solution: _core.Solution | None,
-    error: float,
+    data: Data, joints: Joints, agreed: str, why: str, solution: _core.Solution | None, error: float
 ) -> Existence:
     """The proof by joints that contradict each other, unless it is within rounding."""
     for sign in () if agreed else (1, -1):

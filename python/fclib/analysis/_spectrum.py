@@ -303,10 +303,7 @@ def positive(a: Any, shift: float) -> int:
     shifted = sp.csc_array(a - shift * sp.eye_array(a.shape[0]))
     # pivots on the diagonal: U's diagonal is D of L D L^T
     factors = splu(
-        shifted,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
+        shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
     return int((factors.U.diagonal() > 0).sum())
 

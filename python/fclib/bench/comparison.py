@@ -192,12 +192,7 @@ def keys_of(runs: Table, both_forms: bool = False) -> tuple[Integers, list[Key]]
     _, first, inverse = np.unique(code, return_index=True, return_inverse=True)
     names, words = list(known), list(chains)
     keys = [
-        (
-            names[base[k]],
-            float(tols[tol[k]]),
-            words[chain[sequences.codes[k]]],
-            int(steps[step[k]]),
-        )
+        (names[base[k]], float(tols[tol[k]]), words[chain[sequences.codes[k]]], int(steps[step[k]]))
         for k in first.tolist()
     ]
     return inverse.astype(np.int64), keys

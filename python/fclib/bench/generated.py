@@ -126,12 +126,7 @@ def stored(name: str, form: str | None, start: int, count: int | None, stride: i
     if plan.trajectory is None:
         raise _core.Error(f"set {name}: no states are stored of it, which a sequence is made from")
     path = plan.trajectory
-    recipe = {
-        "states": path.name,
-        "of": folders[0],
-        "form": form,
-        "steps": [start, count, stride],
-    }
+    recipe = {"states": path.name, "of": folders[0], "form": form, "steps": [start, count, stride]}
 
     def make(folder: Path) -> None:
         try:

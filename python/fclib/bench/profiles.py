@@ -102,10 +102,7 @@ JUDGED = {
     "both": "the tolerance bounds both natural maps",
     "natural": "the tolerance bounds the natural map of the literature alone",
 }
-WEIGHED = {
-    "families": "each family weighs the same",
-    "instances": "each instance weighs the same",
-}
+WEIGHED = {"families": "each family weighs the same", "instances": "each instance weighs the same"}
 
 
 def load(
@@ -467,10 +464,7 @@ def _pairs(costs: Costs, chosen: Sequence[tuple[int, int]], seed: int, weigh: We
 
 
 def summary(
-    costs: Costs,
-    penalty: float = PENALTY,
-    shift: float = SHIFT,
-    weigh: Weigh = "instances",
+    costs: Costs, penalty: float = PENALTY, shift: float = SHIFT, weigh: Weigh = "instances"
 ) -> list[dict[str, Any]]:
     """One row for each tolerance and solver: the virtual best first, then by solved and mean.
 

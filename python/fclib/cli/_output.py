@@ -93,8 +93,7 @@ Tolerance = Annotated[
     float, typer.Option("--tol", help="Bound on the error.", min=0.0, callback=finite_tolerance)
 ]
 Modules = Annotated[
-    list[Path] | None,
-    typer.Option("--module", help="A file of Python with solvers of your own."),
+    list[Path] | None, typer.Option("--module", help="A file of Python with solvers of your own.")
 ]
 Merit = Annotated[
     MeritKind,

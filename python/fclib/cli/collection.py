@@ -207,8 +207,7 @@ def show_set(name: str, as_json: bool) -> None:
 @app.command()
 def build(
     names: Annotated[
-        list[str] | None,
-        typer.Argument(help="Sets, families, or problems: SET/FAMILY/NUMBER."),
+        list[str] | None, typer.Argument(help="Sets, families, or problems: SET/FAMILY/NUMBER.")
     ] = None,
     listed: ListFile = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
@@ -675,11 +674,7 @@ def add(
     file without a valid problem is named and left out, and the exit status is 1.
     """
     rules = collections.Rules(
-        references=references,
-        tol=tol,
-        time_limit=time_limit,
-        license=license_,
-        citation=citation,
+        references=references, tol=tol, time_limit=time_limit, license=license_, citation=citation
     )
     mine = collections.plain(name or resolved(source).name)
     try:

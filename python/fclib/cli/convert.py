@@ -264,8 +264,7 @@ def command(
     output: Annotated[
         Format | None,
         typer.Option(
-            "--format",
-            help="Format of the output; by default what its name says, hdf5 with --out.",
+            "--format", help="Format of the output; by default what its name says, hdf5 with --out."
         ),
     ] = None,
     kind: Annotated[

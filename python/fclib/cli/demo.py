@@ -10,17 +10,7 @@ import typer
 
 from fclib import bench, demo
 from fclib._words import counted
-from fclib.cli._output import (
-    Json,
-    Report,
-    Rows,
-    Tolerance,
-    each_file,
-    err,
-    fail,
-    out,
-    progress_bar,
-)
+from fclib.cli._output import Json, Report, Rows, Tolerance, each_file, err, fail, out, progress_bar
 from fclib.cli._profile import print_profile
 from fclib.cli._progress import live
 

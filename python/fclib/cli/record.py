@@ -23,8 +23,7 @@ def command(
     script: Annotated[
         Path,
         typer.Argument(
-            help="A Python script; of LMGC90 also the folder of a deck, DATBOX.",
-            show_default=False,
+            help="A Python script; of LMGC90 also the folder of a deck, DATBOX.", show_default=False
         ),
     ],
     arguments: Annotated[

@@ -119,8 +119,7 @@ def command(
         typer.Option(help="Leave out a feature knowingly: limits, frictionloss, ..."),
     ] = None,
     floating: Annotated[
-        bool,
-        typer.Option("--floating", help="The root of a URDF file moves, it is not welded."),
+        bool, typer.Option("--floating", help="The root of a URDF file moves, it is not welded.")
     ] = False,
     ground: Annotated[
         float | None,
@@ -218,10 +217,7 @@ def command(
         if lmgc90 is not None:
             assert time_step is not None
             loaded = deck_scene.scene_of(
-                lmgc90,
-                time_step=time_step,
-                theta=0.5 if theta is None else theta,
-                period=period,
+                lmgc90, time_step=time_step, theta=0.5 if theta is None else theta, period=period
             )
         else:
             loaded = scenes.Scene.from_file(

@@ -62,8 +62,7 @@ def command(
         float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.001)
     ] = None,
     kind: Annotated[
-        str | None,
-        typer.Option(help="Which of several problems in a file: local, global, ..."),
+        str | None, typer.Option(help="Which of several problems in a file: local, global, ...")
     ] = None,
     write: Annotated[
         bool, typer.Option("--write", help="Store solutions that converged in their files.")

@@ -27,8 +27,7 @@ def command(
         Path | None, typer.Option("--out", help="Write the page here, and open nothing.")
     ] = None,
     serve: Annotated[
-        bool,
-        typer.Option("--serve", help="Serve the page to this machine alone, until Ctrl-C."),
+        bool, typer.Option("--serve", help="Serve the page to this machine alone, until Ctrl-C.")
     ] = False,
     module: Annotated[
         Path | None,

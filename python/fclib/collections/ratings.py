@@ -141,6 +141,7 @@ def runs() -> tuple[Run, ...]:
 
 # of a part of the published runs
 COLUMNS: Final = ("hash", "solver", "version", "time_limit", "status", "error", "cpu_s", "started")
+COUNTED: Final = {"tol": TOLERANCE, "merit": "both", "start": "cold"}
 
 
 @functools.lru_cache(maxsize=2)
@@ -168,16 +169,15 @@ def _rows_of(path: Path) -> list[dict[str, Any]]:
     """The rows of a part that count."""
     try:
         pa = catalog.arrow()
-        only = [("tol", "=", TOLERANCE), ("merit", "=", "both"), ("start", "=", "cold")]
-        rows: list[dict[str, Any]] = pa.parquet.read_table(
-            path, columns=[*COLUMNS], filters=only
-        ).to_pylist()
+        # a filter of pyarrow's would import pandas, in each process of a build
+        table = pa.parquet.ParquetFile(path).read([*COLUMNS, *COUNTED])
+        rows: list[dict[str, Any]] = table.select([*COLUMNS, *COUNTED]).to_pylist()
     except ImportError as missing:
         raise RatingError(str(missing)) from None
     except (pa.ArrowException, KeyError) as wrong:
         reason = str(wrong).splitlines()[0]
         raise RatingError(f"{path}: cannot be read as published runs: {reason}") from None
-    return rows
+    return [row for row in rows if all(row[name] == value for name, value in COUNTED.items())]
 
 
 def _median(same: list[Run]) -> Run:

@@ -137,11 +137,7 @@ def finished(problem: Any, found: Found) -> Found:
             break
         try:
             result = _solve.solve(
-                problem,
-                name,
-                tol=TARGET,
-                guess=found.solution,
-                max_iterations=iterations,
+                problem, name, tol=TARGET, guess=found.solution, max_iterations=iterations
             )
         except _core.UnsuitableError:
             continue

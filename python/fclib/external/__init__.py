@@ -7,7 +7,7 @@ Each file in this folder is one adapter. An adapter has
     missing()    the package to install; empty if nothing is missing
     version()    version of the package, if nothing is missing; empty if it has none
     solvers()    its entries, if nothing is missing
-    find(name)   the entry of this name, or None
+    find(name)   the entry of this name; not there if solvers() has them all
 
 The package is an entry point of ``fclib.solvers``, like a user's own.
 """
@@ -17,7 +17,7 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -38,9 +38,6 @@ class Adapter(Protocol):
 
     def solvers(self) -> Sequence[_core.SolverInfo]:
         """The entries, if nothing is missing."""
-
-    def find(self, name: str) -> _core.SolverInfo | None:
-        """The entry of a name that begins with the prefix."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +77,11 @@ def find(name: str) -> _core.SolverInfo | None:
             continue
         if word := adapter.missing():
             raise _core.OptionError(f"solver '{name}': {word}")
-        found = adapter.find(name)
-        if found is None:
-            known = ", ".join(info.name for info in adapter.solvers())
-            raise _core.OptionError(f"solver '{name}': unknown; there is: {known}")
-        return found
+        own: Callable[[str], _core.SolverInfo] | None = getattr(adapter, "find", None)
+        if own:
+            return own(name)
+        entries = {info.name: info for info in adapter.solvers()}
+        if name not in entries:
+            raise _core.OptionError(f"solver '{name}': unknown; there is: {', '.join(entries)}")
+        return entries[name]
     return None

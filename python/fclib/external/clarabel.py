@@ -41,11 +41,6 @@ def solvers() -> Sequence[_core.SolverInfo]:
     )
 
 
-def find(name: str) -> _core.SolverInfo | None:
-    """The entry of a name."""
-    return next((info for info in solvers() if info.name == name), None)
-
-
 class Conic:
     """One program for several c; each solve starts from Clarabel's own point."""
 

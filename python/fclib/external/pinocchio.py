@@ -61,11 +61,6 @@ def solvers() -> Sequence[_core.SolverInfo]:
     )
 
 
-def find(name: str) -> _core.SolverInfo | None:
-    """The entry of a name."""
-    return next((info for info in solvers() if info.name == name), None)
-
-
 def _entry(which: str, family: str, title: str) -> _core.SolverInfo:
     def function(problem: _core.LocalProblem, r: Any, monitor: _core.Monitor) -> Any:
         return _solve(which, problem, r, monitor)

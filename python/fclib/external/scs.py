@@ -45,11 +45,6 @@ def solvers() -> Sequence[_core.SolverInfo]:
     return _convex.entries("scs", "the splitting conic solver SCS", "O'Donoghue 2021", Conic)
 
 
-def find(name: str) -> _core.SolverInfo | None:
-    """The entry of a name."""
-    return next((info for info in solvers() if info.name == name), None)
-
-
 class _Others(io.TextIOBase):
     """Standard output for other threads: SCS always prints failures, so this thread is silenced."""
 

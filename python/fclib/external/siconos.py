@@ -157,11 +157,6 @@ def solvers() -> Sequence[_core.SolverInfo]:
     )
 
 
-def find(name: str) -> _core.SolverInfo | None:
-    """The entry of a name."""
-    return next((info for info in solvers() if info.name == name), None)
-
-
 def _entry(
     name: str,
     kind: str,

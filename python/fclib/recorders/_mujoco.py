@@ -116,11 +116,7 @@ def record(
             **(dict.fromkeys(("G", "b"), "reconstructed") if assembled.problem.p else {}),
         },
         guess=reaction_of(
-            assembled,
-            reaction,
-            force[limits],
-            (force[dry], h * bound),
-            (J[joints], force[joints]),
+            assembled, reaction, force[limits], (force[dry], h * bound), (J[joints], force[joints])
         ),
         velocity=np.array(data.qvel),
         contacts=contacts,

@@ -219,11 +219,7 @@ def velocities(
 
 
 def parts_of(
-    p: Any,
-    body: int,
-    place: dict[tuple[int, int], int],
-    v: Vector,
-    options: dict[str, Any],
+    p: Any, body: int, place: dict[tuple[int, int], int], v: Vector, options: dict[str, Any]
 ) -> dict[tuple[int, int], Part]:
     """The base and the links of a body.
 

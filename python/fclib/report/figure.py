@@ -121,11 +121,7 @@ def write_figure(
 
 
 def environment(
-    path: Path,
-    columns: int,
-    title: str,
-    words: Sequence[str],
-    named: Mapping[str, Sequence[str]],
+    path: Path, columns: int, title: str, words: Sequence[str], named: Mapping[str, Sequence[str]]
 ) -> str:
     """The figure in LaTeX, with its caption."""
     kind = "figure*" if columns == 2 else "figure"

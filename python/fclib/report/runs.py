@@ -82,11 +82,7 @@ class Campaigns:
             self.store = self._merged(stores)
             # cold runs; runs that start from a step before are only in `along`
             self.rows = profiles.load(
-                self.store,
-                machine=machine,
-                campaign=campaign,
-                merit=merit,
-                more=("message",),
+                self.store, machine=machine, campaign=campaign, merit=merit, more=("message",)
             )
             first = self.rows.row(0)
             node, judged = first["node"], first["merit"]
@@ -326,10 +322,6 @@ def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
         # failures first, and among them those that were easiest for another solver
         lost = sorted((i for i in order if ratio[i] > 1), key=lambda i: (-ratio[i], best[i]))
         found[name] = rounded(
-            {
-                "best": [entry(i) for i in won],
-                "worst": [entry(i) for i in lost[:EXTREMES]],
-            },
-            DIGITS,
+            {"best": [entry(i) for i in won], "worst": [entry(i) for i in lost[:EXTREMES]]}, DIGITS
         )
     return found

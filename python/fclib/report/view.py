@@ -234,10 +234,7 @@ def asset(name: str) -> str:
 
 
 def write_view(
-    record: Mapping[str, Any],
-    path: Path,
-    title: str = "",
-    compute: Mapping[str, Any] | None = None,
+    record: Mapping[str, Any], path: Path, title: str = "", compute: Mapping[str, Any] | None = None
 ) -> None:
     """Write a page that holds all it needs; the file is whole, or stays the old one.
 

@@ -147,9 +147,7 @@ def _wanted(
 
 
 def _ratios(
-    here: Calibration | None,
-    machines: Mapping[str, Mapping[str, Any]],
-    part: Path,
+    here: Calibration | None, machines: Mapping[str, Mapping[str, Any]], part: Path
 ) -> dict[str, Ratio]:
     """The factor of the times of each machine of a part."""
     found = {}

@@ -12,11 +12,7 @@ from fclib.scenes.shared.family import parameter
 
 SIZES: Final = (100, 300, 1000, 3000)  # approximate numbers of contacts
 # cohesion over the mean load of a contact of the uppermost joint, or of the ground if pushed
-SHARES: Final = {
-    "tower": (0.9, 1.05, 2.0),
-    "curtain": (0.9, 1.05, 2.0),
-    "pushed": (0.05, 0.2, 0.8),
-}
+SHARES: Final = {"tower": (0.9, 1.05, 2.0), "curtain": (0.9, 1.05, 2.0), "pushed": (0.05, 0.2, 0.8)}
 CORNERS: Final = 4  # contacts of two faces
 BLOCK: Final = 1000.0  # mass of a block of a tower [kg]
 

@@ -69,11 +69,7 @@ class ElasticCubes:
             self,
             seed,
             solids=Solids(
-                blocks=(),
-                meshes=(lower, upper),
-                mu=self.mu,
-                reach=self.alert,
-                gravity=self.gravity,
+                blocks=(), meshes=(lower, upper), mu=self.mu, reach=self.alert, gravity=self.gravity
             ),
             interactions=(
                 Interaction(kinds=(0, 1), mu=self.mu, alert=self.alert, law="GAP_SGR_CLB"),

@@ -148,9 +148,7 @@ class ElasticLowWall:
                     Surface(kind=RIGHT, candidate=False, quads=box.quads("x+")),
                     Surface(kind=OUTER if lowest else LOWER, candidate=True, quads=box.quads("z-")),
                     Surface(
-                        kind=OUTER if highest else UPPER,
-                        candidate=highest,
-                        quads=box.quads("z+"),
+                        kind=OUTER if highest else UPPER, candidate=highest, quads=box.quads("z+")
                     ),
                 ),
             )

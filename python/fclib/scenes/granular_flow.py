@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from fclib import _core, _stored
 from fclib.scenes.shared import assembly
@@ -114,8 +113,7 @@ def bodies_of(state: State) -> assembly.Bodies:
     """The spheres of a state and all their contacts within reach."""
     count, radii, centres = len(state.radii), state.radii, state.places
     reach = REACH * DIAMETER
-    pairs = cKDTree(centres).query_pairs(DIAMETER + reach, output_type="ndarray")
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int64)
+    pairs = assembly.near(centres, DIAMETER + reach)
     difference = centres[pairs[:, 1]] - centres[pairs[:, 0]]
     x, y, z = difference.T
     distance = np.sqrt(x * x + y * y + z * z)

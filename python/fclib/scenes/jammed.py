@@ -11,8 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.sparse.linalg import lsqr
-from scipy.spatial import cKDTree
 
 from fclib.scenes.shared import assembly, mjcf
 from fclib.scenes.shared.family import parameter
@@ -95,8 +93,7 @@ class Jammed:
         largest, places, radii = stored(spheres)
         unit = self.radius / largest  # edge of the cube [m]
         centres, radii = unit * places, unit * radii
-        pairs = cKDTree(centres).query_pairs((2 + self.reach) * self.radius, output_type="ndarray")
-        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int64)
+        pairs = assembly.near(centres, (2 + self.reach) * self.radius)
         difference = centres[pairs[:, 1]] - centres[pairs[:, 0]]
         distance = np.linalg.norm(difference, axis=1)
         normals, points = [difference / distance[:, None]], [centres[pairs].mean(axis=1)]
@@ -136,6 +133,8 @@ class Jammed:
 
     def proof(self, problem: Any, spheres: int) -> npt.NDArray[np.float64]:
         """Normal reactions (3 nc), H y = 0 to rounding: the overlaps of the packing as forces."""
+        from scipy.sparse.linalg import lsqr  # the import takes a while
+
         y = np.zeros(3 * problem.nc)
         y[0::3] = np.maximum(-np.asarray(self.bodies(spheres).gaps), 0.0)
         y /= y.max()

@@ -88,11 +88,7 @@ class LowWallFEM(Published):
                 top.append(len(blocks))
                 blocks.append(
                     Block(
-                        centre=(
-                            x + 0.5 * share * self.block,
-                            0.0,
-                            (course + 0.5) * self.height,
-                        ),
+                        centre=(x + 0.5 * share * self.block, 0.0, (course + 0.5) * self.height),
                         size=(size, self.depth, self.height),
                         elements=(round(2 * share * self.elements), self.elements, self.elements),
                         young=self.young,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fclib.scenes.shared import assembly, mjcf
 from fclib.scenes.shared.family import parameter
@@ -49,8 +48,7 @@ class Packing:
         side = max(1, round((contacts / 3.3) ** (1 / 3)))
         grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
         centres = SPACING * (grid + 0.5 + self.shake * random.standard_normal(grid.shape))
-        pairs = cKDTree(centres).query_pairs(REACH * SPACING, output_type="ndarray")
-        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].reshape(-1, 2).astype(np.int64)
+        pairs = assembly.near(centres, REACH * SPACING)
         difference = centres[pairs[:, 1]] - centres[pairs[:, 0]]
         normals = [difference / np.linalg.norm(difference, axis=1, keepdims=True)]
         points = [0.5 * (centres[pairs[:, 1]] + centres[pairs[:, 0]])]

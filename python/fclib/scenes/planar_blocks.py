@@ -82,11 +82,7 @@ class PlanarBlocks(Published):
             place = (-away - self.disc_radius, self.courses * self.height * 0.8)
             bodies.append(
                 mjcf.disc(
-                    "disc",
-                    place,
-                    self.disc_radius,
-                    self.density,
-                    f'{look} rgba="0.35 0.37 0.42 1"',
+                    "disc", place, self.disc_radius, self.density, f'{look} rgba="0.35 0.37 0.42 1"'
                 )
             )
             # thrown so high that it comes down at the place of its start

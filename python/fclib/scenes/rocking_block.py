@@ -39,9 +39,7 @@ class RockingBlock(Published):
 
     def __post_init__(self) -> None:
         mjcf.check(
-            self,
-            positive=("width", "height", "mass", "tilt", "time_step"),
-            non_negative=("mu",),
+            self, positive=("width", "height", "mass", "tilt", "time_step"), non_negative=("mu",)
         )
         if not self.tilt < 1:
             raise ValueError(f"RockingBlock: tilt must be < 1, not {self.tilt}")

@@ -32,13 +32,7 @@ GAUSS: Final = CORNERS / np.sqrt(3.0)
 
 
 def matrices(
-    nodes: Vector,
-    elements: Indices,
-    young: float,
-    poisson: float,
-    density: float,
-    *,
-    lumped: bool,
+    nodes: Vector, elements: Indices, young: float, poisson: float, density: float, *, lumped: bool
 ) -> tuple[Sparse, Sparse]:
     """Mass and stiffness (3 k x 3 k) of a mesh of k nodes and of elements (e x 8).
 

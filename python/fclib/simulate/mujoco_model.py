@@ -41,13 +41,7 @@ from fclib.simulate.arrays import (
 from fclib.simulate.drives import Drives
 from fclib.simulate.equalities import Equalities
 from fclib.simulate.faces import complete_faces
-from fclib.simulate.moreau_jean import (
-    ROUNDINGS,
-    Contacts,
-    DryFriction,
-    System,
-    block_columns,
-)
+from fclib.simulate.moreau_jean import ROUNDINGS, Contacts, DryFriction, System, block_columns
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,

@@ -65,13 +65,7 @@ def in_plane(H: Sparse, contacts: Contacts, sizes: Vector) -> tuple[Sparse, Cont
     # a limit has no frame
     frame[np.any(tangent != 0, axis=1), 2] = NORMAL
     return H, Contacts(
-        contacts.pair,
-        contacts.point,
-        frame,
-        contacts.gap,
-        contacts.mu,
-        contacts.mu_r,
-        planar=True,
+        contacts.pair, contacts.point, frame, contacts.gap, contacts.mu, contacts.mu_r, planar=True
     )
 
 

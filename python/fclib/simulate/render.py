@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from fclib._files import write_bytes
 from fclib.simulate._mujoco import mujoco
@@ -66,12 +65,7 @@ class NoRenderer(RuntimeError):  # noqa: N818
     """Neither EGL nor OSMesa works here."""
 
 
-def render(
-    source: Model | Step,
-    path: str | Path,
-    *,
-    size: tuple[int, int] | None = None,
-) -> None:
+def render(source: Model | Step, path: str | Path, *, size: tuple[int, int] | None = None) -> None:
     """Write a PNG of a step, or of the present state of a model, whole or not at all.
 
     source     a step is drawn in its state at the start, with the reactions of its solution;
@@ -267,6 +261,8 @@ def draw_arrows(scene: Any, points: Vector, forces: Vector, radius: float) -> No
 
 def spacing(points: Vector) -> float:
     """The median distance of a point (k x 3) to its nearest other; infinite if all are equal."""
+    from scipy.spatial import cKDTree  # the import takes a while
+
     different = np.unique(points, axis=0)
     if len(different) < 2:
         return math.inf

@@ -263,12 +263,7 @@ def largest(values: Vector) -> float:
 
 
 def trouble(
-    problem: _laws.Global,
-    result: _core.Result,
-    velocity: Vector,
-    bound: float,
-    *,
-    stop: bool,
+    problem: _laws.Global, result: _core.Result, velocity: Vector, bound: float, *, stop: bool
 ) -> str:
     """Why a simulation cannot go on after a step, in words; empty if it can."""
     known = _core.are_within(velocity, bound)
@@ -337,10 +332,7 @@ def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:
 
 
 def same_contacts(
-    before: npt.NDArray[np.int64],
-    old_places: Vector,
-    now: npt.NDArray[np.int64],
-    places: Vector,
+    before: npt.NDArray[np.int64], old_places: Vector, now: npt.NDArray[np.int64], places: Vector
 ) -> npt.NDArray[np.int64]:
     """The contact of the step before that each one continues (nc); -1 for none.
 
@@ -427,9 +419,7 @@ def descriptions(
         if own:
             place = f"{json.dumps(own)[1:-1]}, {place}"
         return _core.ProblemInfo(
-            title=f"{title}{index}",
-            description=f"{before}, {place}, {after}",
-            math_info=math_info,
+            title=f"{title}{index}", description=f"{before}, {place}, {after}", math_info=math_info
         )
 
     return of_step

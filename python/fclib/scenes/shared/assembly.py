@@ -49,6 +49,14 @@ def exponentials(x: Vector) -> Vector:
         return np.array([float(decimal.Decimal(value).exp()) for value in x.tolist()])
 
 
+def near(centres: Vector, distance: float) -> npt.NDArray[np.int64]:
+    """The pairs (k x 2) of points at most so far apart, in order."""
+    from scipy.spatial import cKDTree  # the import takes a while
+
+    pairs = cKDTree(centres).query_pairs(distance, output_type="ndarray").reshape(-1, 2)
+    return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].astype(np.int64))
+
+
 def total(x: Vector) -> float:
     """The sum of numbers, exactly rounded: that of NumPy depends on the processor."""
     return math.fsum(x.tolist())

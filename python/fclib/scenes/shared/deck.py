@@ -43,15 +43,7 @@ from fclib.scenes.shared.deck_data import (
     Start,
     Vector,
 )
-from fclib.scenes.shared.deck_lines import (
-    DeckError,
-    Line,
-    Lines,
-    Place,
-    keyword,
-    number,
-    whole,
-)
+from fclib.scenes.shared.deck_lines import DeckError, Line, Lines, Place, keyword, number, whole
 from fclib.scenes.shared.interaction import LAWS, Course
 
 __all__ = ["DeckError", "folder_of", "read"]

@@ -20,14 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.scenes.shared import mjcf, polyhedron
-from fclib.scenes.shared.deck_data import (
-    MESH,
-    RIGID,
-    SEEN,
-    Contactor,
-    Deck,
-    Mesh,
-)
+from fclib.scenes.shared.deck_data import MESH, RIGID, SEEN, Contactor, Deck, Mesh
 from fclib.scenes.shared.deck_lines import DeckError
 from fclib.scenes.shared.family import Scene
 from fclib.scenes.shared.interaction import Drive, Interaction
@@ -218,11 +211,7 @@ def kinds_of(
 
 
 def _rigid(
-    deck: Deck,
-    name: str,
-    time_step: float,
-    period: tuple[float, float] | None,
-    unknown: list[str],
+    deck: Deck, name: str, time_step: float, period: tuple[float, float] | None, unknown: list[str]
 ) -> dict[str, Any]:
     kinds, interactions = kinds_of(deck, unknown)
     if len(kinds) > KINDS:

@@ -231,12 +231,7 @@ class Scene:
 
     @classmethod
     def _of_mechanics(
-        cls,
-        path: Path,
-        time_step: float | None,
-        restitution: float,
-        law: Law,
-        activation: float,
+        cls, path: Path, time_step: float | None, restitution: float, law: Law, activation: float
     ) -> Scene:
         """The scene of a file of Siconos' mechanics."""
         if time_step is None:

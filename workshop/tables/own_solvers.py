@@ -33,7 +33,10 @@ def seconds(problem: Any, solver: str, tol: float, limit: float) -> tuple[float,
     least = math.inf
     for _ in range(RUNS):
         start = time.process_time()
-        result = fclib.solve(problem, solver, tol, time_limit=limit)
+        try:
+            result = fclib.solve(problem, solver, tol, time_limit=limit)
+        except fclib.UnsuitableError:  # it does not take the law of the problem
+            return 2 * limit, None
         least = min(least, time.process_time() - start)
         if result.status != "converged":
             return 2 * limit, result

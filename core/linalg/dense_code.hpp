@@ -39,9 +39,8 @@ void subtract_product(DenseView c, DenseView a, DenseView b) {
 }
 
 void solve_unit_lower(DenseView l, DenseView b) {
-  with_columns(b, [&](auto& x) {
-    columns(l).template triangularView<Eigen::UnitLower>().solveInPlace(x);
-  });
+  with_columns(
+      b, [&](auto& x) { columns(l).template triangularView<Eigen::UnitLower>().solveInPlace(x); });
 }
 
 void solve_upper(DenseView u, DenseView b) {

@@ -33,7 +33,7 @@ struct Front {
     std::int64_t block;
     Index row, col;  // scalar offsets
   };
-  struct Run {  // neighbouring rows of the update that are neighbours in the parent's front
+  struct Run {        // neighbouring rows of the update that are neighbours in the parent's front
     Index to, count;  // scalar
   };
   Index pivots = 0;          // scalar

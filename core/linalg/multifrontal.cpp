@@ -231,7 +231,8 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
     if (other != row) factors.upper.row(row).swap(factors.upper.row(other));
   }
   split(u, threads, [&](Index first, Index count) {
-    kernels_->solve_unit_lower(view(factors.diagonal), view(factors.upper.middleCols(first, count)));
+    kernels_->solve_unit_lower(view(factors.diagonal),
+                               view(factors.upper.middleCols(first, count)));
   });
   factors.lower = a.bottomLeftCorner(u, k);
   split(u, threads, [&](Index first, Index count) {
@@ -299,7 +300,8 @@ void Multifrontal::backward(std::size_t f, Vector& local) const {
   }
   auto top = local.head(front.pivots);
   if (u > 0) {
-    kernels_->subtract_product(view(top), view(factors.upper), view(local.segment(front.pivots, u)));
+    kernels_->subtract_product(view(top), view(factors.upper),
+                               view(local.segment(front.pivots, u)));
   }
   kernels_->solve_upper(view(factors.diagonal), view(top));
   for (Index k = 0; k < front.pivots / d; ++k) {

@@ -11,8 +11,7 @@ namespace fclib {
 #ifdef FCLIB_AVX2
 /// Whether this processor has AVX2 and fused products.
 inline bool has_avx2() {
-  static const bool has =
-      __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  static const bool has = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
   return has;
 }
 #endif

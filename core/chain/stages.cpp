@@ -301,7 +301,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
 
 template <class Cone>
 double Island<Cone>::paid_for(const Patience& rules) {
-  const double factorisations = !fits(system().bytes())   ? instead_of_factors
+  const double factorisations = !fits(system().bytes()) ? instead_of_factors
                                 : rules.worth > 0 ? rules.worth
                                                   : static_cast<double>(system().factorisations());
   const double steps =

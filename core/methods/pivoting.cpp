@@ -160,8 +160,7 @@ int Pivoting<Cone>::solve(const Vector& cover, int most, FunctionRef<bool(int)> 
   for (Index a = 0; a < nc; ++a) {
     const auto own = edges_.template middleRows<D>(D * a);
     r.template segment<D>(D * a) =
-        own.col(0) * x[a] +
-        own.rightCols(of_contact) * x.segment(nc + a * of_contact, of_contact);
+        own.col(0) * x[a] + own.rightCols(of_contact) * x.segment(nc + a * of_contact, of_contact);
   }
   return pivots;
 }

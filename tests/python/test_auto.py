@@ -625,6 +625,17 @@ def test_random_starts_end_when_the_time_is_over() -> None:
     assert time.perf_counter() - start < 20  # a million starts without a factorisation take minutes
 
 
+# what the polish of the last pivots finds takes no iteration
+@pytest.mark.parametrize("number", [24, 123, 205, 245])
+def test_the_history_ends_with_the_error_of_the_result(number: int) -> None:
+    result = fclib.solve(planted(number)[0], history=True)
+    assert result.converged
+    assert result.history is not None
+    assert result.history[-1][1] == result.error
+    assert (np.diff(result.history["time"]) >= 0).all()
+    assert result.history[-1][0] == result.iterations
+
+
 @pytest.mark.parametrize("method", ["sweep_on", "spectral_gradient"])
 def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
     packing: Any = fclib.scenes.assemblies()["Packing"]()

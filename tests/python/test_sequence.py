@@ -414,9 +414,9 @@ def test_a_full_disk_leaves_no_part_of_a_simulated_sequence(size: str, tmp_path:
     )
     words = ["-m", "fclib", "simulate", "--steps", "100", "--out"]
     script = '"$@"; echo "ended by $?"; ls -A "$0"'
-    command = [sys.executable, *words, tmp_path / "run.h5", scene]
+    command = [sys.executable, *words, str(tmp_path / "run.h5"), str(scene)]
     done = subprocess.run(
-        [*apart, *disk, "sh", "-c", script, tmp_path, *command], capture_output=True, text=True
+        [*apart, *disk, "sh", "-c", script, str(tmp_path), *command], capture_output=True, text=True
     )
     assert os.strerror(errno.ENOSPC) in done.stderr
     assert done.stdout.splitlines()[-1] == "ended by 1"

@@ -392,7 +392,9 @@ def test_a_guess_that_is_the_solution_is_returned(law: str) -> None:
     assert again.cpu_s > 0
     assert again.setup_s > 0
     # who listens hears of it
-    assert fclib.solve(problem, guess=known.solution, history=True).history
+    heard = fclib.solve(problem, guess=known.solution, history=True).history
+    assert heard is not None
+    assert len(heard) > 0
     for off in (1e-6, 1e-2):
         near = fclib.Solution(r=known.solution.r * (1 + off))
         better = fclib.solve(problem, tol=1e-8, guess=near)

@@ -1,4 +1,4 @@
-// When a solve has to end: set before the conversions, checked before each factorisation.
+// When a solve has to end: set before the conversions, checked before and in each factorisation.
 #pragma once
 
 #include <chrono>

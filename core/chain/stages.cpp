@@ -193,12 +193,11 @@ bool Island<Cone>::applies(const StageRule& rule) const {
 
 template <class Cone>
 bool Island<Cone>::affordable(const StageRule& rule) {
-  return !factorises(rule.method) || fits(system());
+  return !factorises(rule.method) || fits(system().bytes());
 }
 
 template <class Cone>
-bool Island<Cone>::fits(const CoupledSystem& system) {
-  const double bytes = system.bytes();
+bool Island<Cone>::fits(double bytes) {
   if (resources_.memory == 0 && bytes < never_too_much) return true;
   const double limit =
       resources_.memory > 0 ? resources_.memory : spare_memory * available_memory();
@@ -309,7 +308,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
 
 template <class Cone>
 double Island<Cone>::paid_for(const Patience& rules) {
-  const double factorisations = !fits(system())   ? instead_of_factors
+  const double factorisations = !fits(system().bytes()) ? instead_of_factors
                                 : rules.worth > 0 ? rules.worth
                                                   : static_cast<double>(system().factorisations());
   const double steps =
@@ -531,7 +530,7 @@ void Island<Cone>::run(const HomotopyStage& rules) {
 template <class Cone>
 void Island<Cone>::run(const NewtonStage& rules) {
   SemismoothNewton<Cone> newton(problem_, rules.function, resources_.threads);
-  if (!fits(newton.system())) return;
+  if (!fits(newton.system().bytes())) return;
   if (rules.most_flops > 0 && newton.system().flops() > rules.most_flops * system().flops()) {
     return;
   }
@@ -553,13 +552,16 @@ void Island<Cone>::descend(SemismoothNewton<Cone>& newton, const NewtonRules& ru
 
 template <class Cone>
 void Island<Cone>::run(const PivotingStage& rules) {
-  const Pivoting<Cone> method(problem_, static_cast<int>(rules.edges));
+  const int edges = static_cast<int>(rules.edges);
+  if (!fits(Pivoting<Cone>::bytes(problem_, edges))) return;
+  const Pivoting<Cone> method(problem_, edges);
   Random random;
   Vector r;
   Vector cover = Vector::Ones(method.size());
   for (std::int64_t k = 0; k < rules.tries && !done(); ++k) {
     const auto most = std::min(most_pivots, tracker_.left());
-    const int pivots = method.solve(cover, static_cast<int>(most), r);
+    const int pivots = method.solve(
+        cover, static_cast<int>(most), [&](int made) { return tracker_.glance(made, best_); }, r);
     if (tracker_.report(pivots, error_, best_)) return;
     if (rounding_of_velocity(r) < most_rounding * tolerance_) {
       proximal({.patience = endless, .max_factorisations = polish_of_pivots}, r);
@@ -586,8 +588,10 @@ void Island<Cone>::run(const RandomStartsStage& rules) {
     size = std::hypot(size, unit[a] * problem_.q.template segment<D>(D * a).norm());
   }
   SemismoothNewton<Cone> newton(problem_, ContactFunctionKind::natural_map, resources_.threads);
+  if (!fits(newton.system().bytes())) return;
   Random random;
   for (std::int64_t k = 0; k < rules.tries && !done(); ++k) {
+    if (tracker_.glance(0, best_)) break;  // a start whose factorisation fails reports nothing
     Vector start = Vector::Zero(problem_.m());
     for (Index a = 0; a < problem_.nc(); ++a) {
       if (random.between(0, 3) < 1) continue;
@@ -684,7 +688,7 @@ void Island<Cone>::run(const OwnUnitsStage& rules) {
     const Vector r = own.reactions(*progress.r);
     problem_.velocity(r, u);
     const std::int64_t count = progress.iteration - std::exchange(told, progress.iteration);
-    return !take(count, relative_error<Cone>(problem_, u, r), r);
+    return !take(count, relative_error<Cone>(problem_, u, r), r) && !tracker_.glance(0, best_);
   };
   Vector r = own.to_own(start_of(rules.from));
   const double start = cpu_time();

@@ -43,7 +43,7 @@ class Island {
   [[nodiscard]] bool applies(const StageRule& rule) const;
   /// Whether there is enough memory for what the method factorises.
   [[nodiscard]] bool affordable(const StageRule& rule);
-  bool fits(const CoupledSystem& system);
+  bool fits(double bytes);
   /// The largest share of a contact's mobility that bilateral constraints take away. rho still
   /// holds the mobility without them.
   [[nodiscard]] double jointed() const;

@@ -29,13 +29,13 @@ class Tracker {
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
   [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
 
-  /// Notes that factors of so many bytes are not made, because only `limit` bytes are there.
+  /// Notes that matrices of so many bytes are not made, because only `limit` bytes are there.
   void without_factors(double bytes, double limit) {
     if (bytes <= too_large_) return;
     too_large_ = bytes;
     char text[120];
     std::snprintf(text, sizeof text,
-                  "factors of %.3g GB do not fit into %.3g GB of memory: methods that factorise "
+                  "matrices of %.3g GB do not fit into %.3g GB of memory: methods that need them "
                   "were left out",
                   bytes / 1e9, limit / 1e9);
     message_ = text;
@@ -74,6 +74,14 @@ class Tracker {
       stopped_ = monitor_.report(iterations_, told_, shown(r));
     }
     return stopped_.has_value() || !finite;
+  }
+  /// Whether to stop `iterations` after the last report. It may be asked at any time: the monitor
+  /// gets a report only if one is due.
+  bool glance(std::int64_t iterations, const Vector& r) {
+    if (!stopped_ && monitor_.due()) {
+      stopped_ = monitor_.report(iterations_ + iterations, told_, shown(r));
+    }
+    return stopped_.has_value();
   }
   /// The iterations that may still be made.
   [[nodiscard]] std::int64_t left() const { return monitor_.max_iterations() - iterations_; }
@@ -114,7 +122,7 @@ class Tracker {
   }
 
   Monitor monitor_;
-  double too_large_ = 0;  // bytes of the largest factors that are not made
+  double too_large_ = 0;  // bytes of the largest matrices that are not made
   std::string message_;
   double others_ = 0;
   double told_ = std::numeric_limits<double>::max();  // the last finite error that was reported

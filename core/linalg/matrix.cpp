@@ -47,6 +47,23 @@ void require_pointers(const Matrix& a, Index count, const std::string& where) {
   require_length(a.x.size(), static_cast<std::size_t>(a.p.back()), where, "/x", "the value array");
 }
 
+/// Entries at the same place are added up, and no double may hold their sum.
+void require_finite_sums(const Matrix& a, const std::string& where) {
+  double sum = 0;
+  for (const double value : a.x) sum += std::abs(value);
+  if (std::isfinite(sum) || is_canonical(a)) return;
+  const SparseColumns added = to_eigen(a);
+  std::size_t k = 0;
+  for_each_entry(a, [&](Index row, Index col, double) {
+    if (!std::isfinite(added.coeff(row, col))) {
+      invalid(where + "/x[" + std::to_string(k) + "]",
+              "the sum of the entries in row " + std::to_string(row) + ", column " +
+                  std::to_string(col) + " is not a finite number");
+    }
+    ++k;
+  });
+}
+
 }  // namespace
 
 void validate_places(const Matrix& a, const std::string& where) {
@@ -81,6 +98,7 @@ void validate(const Matrix& a, const std::string& where) {
       invalid(where + "/x[" + std::to_string(k) + "]", "the value is not a finite number");
     }
   }
+  require_finite_sums(a, where);
 }
 
 void require_counted(std::span<const double> x, std::size_t counted, const std::string& counter) {

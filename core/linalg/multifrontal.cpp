@@ -144,15 +144,16 @@ void Multifrontal::split(Index n, int threads, const F& f) {
                       [&](int k) { f(k * part, k + 1 < parts ? part : n - k * part); });
 }
 
-bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
-                                    int threads) {
+bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged,
+                                    const Task& task, int threads) {
   // right-looking by panels; the trailing update is a matrix product
   constexpr Index panel = 24;
   const auto n = static_cast<Index>(a.rows());
   for (Index start = 0; start < n; start += panel) {
+    if (task.out_of_time()) return false;
     const Index width = std::min(panel, n - start);
     const Index end = start + width;
-    if (!kernels_->eliminate(view(a), start, end, tiny, exchanged.data())) return false;
+    if (!kernels_->eliminate(view(a), start, end, task.tiny, exchanged.data())) return false;
     if (end == n) break;
     const Index rest = n - end;
     split(rest, rest < few ? 1 : threads, [&](Index first, Index count) {
@@ -165,15 +166,15 @@ bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exc
   return true;
 }
 
-bool Multifrontal::factorise(const std::vector<double>& values) {
+bool Multifrontal::factorise(const std::vector<double>& values, const Deadline* deadline) {
   const Eigen::Map<const Vector> all(values.data(), static_cast<Eigen::Index>(values.size()));
   if (!all.allFinite()) return false;
   const double largest = values.empty() ? 0 : all.lpNorm<Eigen::Infinity>();
-  const double tiny = 1e-18 * largest;
+  const Task task{values, 1e-18 * largest, deadline};
   std::vector<char> failed(shares_.size(), 0);
   const auto work_on = [&](std::size_t k) {
     for (const std::size_t f : shares_[k]) {
-      if (!factorise_front(f, values, tiny, work_[k], 1)) failed[k] = 1;
+      if (!factorise_front(f, task, work_[k], 1)) failed[k] = 1;
       if (failed[k]) return;
     }
   };
@@ -184,13 +185,12 @@ bool Multifrontal::factorise(const std::vector<double>& values) {
   if (std::find(failed.begin(), failed.end(), 1) != failed.end()) return false;
   const int threads = std::max(1, static_cast<int>(shares_.size()));
   for (const std::size_t f : top_) {
-    if (!factorise_front(f, values, tiny, work_[0], threads)) return false;
+    if (!factorise_front(f, task, work_[0], threads)) return false;
   }
   return true;
 }
 
-bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& values, double tiny,
-                                   Dense& work, int threads) {
+bool Multifrontal::factorise_front(std::size_t f, const Task& task, Dense& work, int threads) {
   const int d = symbolic_->d;
   const std::size_t block_size = static_cast<std::size_t>(d) * static_cast<std::size_t>(d);
   const Front& front = symbolic_->fronts[f];
@@ -199,7 +199,7 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
   auto a = work.topLeftCorner(front.size, front.size);
   a.setZero();
   for (const Front::Entry& entry : front.entries) {
-    const double* block = values.data() + block_size * static_cast<std::size_t>(entry.block);
+    const double* block = task.values.data() + block_size * static_cast<std::size_t>(entry.block);
     for (int c = 0; c < d; ++c) {
       for (int r = 0; r < d; ++r) a(entry.row + r, entry.col + c) += block[d * c + r];
     }
@@ -223,7 +223,7 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
   const Index k = front.pivots;
   const Index u = front.size - k;
   factors.diagonal = a.topLeftCorner(k, k);
-  if (!factorise_pivots(factors.diagonal, factors.exchanged, tiny, threads)) return false;
+  if (!factorise_pivots(factors.diagonal, factors.exchanged, task, threads)) return false;
   if (u == 0) return true;
   factors.upper = a.topRightCorner(k, u);
   for (Index row = 0; row < k; ++row) {
@@ -234,11 +234,13 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
     kernels_->solve_unit_lower(view(factors.diagonal),
                                view(factors.upper.middleCols(first, count)));
   });
+  if (u >= few && task.out_of_time()) return false;
   factors.lower = a.bottomLeftCorner(u, k);
   split(u, threads, [&](Index first, Index count) {
     kernels_->solve_upper_from_right(view(factors.diagonal),
                                      view(factors.lower.middleRows(first, count)));
   });
+  if (u >= few && task.out_of_time()) return false;
   factors.update = a.bottomRightCorner(u, u);
   split(u, threads, [&](Index first, Index count) {
     kernels_->subtract_product(view(factors.update.middleCols(first, count)), view(factors.lower),

@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "deadline.hpp"
 #include "linalg/dense_kernels.hpp"
 #include "linalg/fronts.hpp"
 #include "linalg/workers.hpp"
@@ -41,8 +42,8 @@ class Multifrontal {
   [[nodiscard]] Index size() const { return symbolic_->size; }
 
   /// Factorises the matrix with these values (BlockPattern::values() of them). Returns false if an
-  /// entry is not finite.
-  bool factorise(const std::vector<double>& values);
+  /// entry is not finite, or the deadline passes meanwhile.
+  bool factorise(const std::vector<double>& values, const Deadline* deadline = nullptr);
 
   /// The threads that share its work, or none if it is too small for them.
   [[nodiscard]] Workers* workers() const { return workers_.get(); }
@@ -66,10 +67,17 @@ class Multifrontal {
     mutable Vector right;          // what a solve leaves to the parent
   };
 
-  bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
+  struct Task {  // a factorisation
+    const std::vector<double>& values;
+    double tiny;
+    const Deadline* deadline;
+
+    [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }
+  };
+
+  bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, const Task& task,
                         int threads);
-  bool factorise_front(std::size_t f, const std::vector<double>& values, double tiny, Dense& work,
-                       int threads);
+  bool factorise_front(std::size_t f, const Task& task, Dense& work, int threads);
   void share_out(int threads);
   void forward(std::size_t f, Vector& local) const;
   void backward(std::size_t f, Vector& local) const;

@@ -42,10 +42,11 @@ Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(pr
 
   // if each contact has a unit of its own, the cones do not change
   const Vector unit = contact_weights(problem).cwiseSqrt().cwiseInverse();
-  B_ = Eigen::MatrixXd::Zero(m, reactions);
+  const Eigen::Index columns = 1 + of_contact;
+  edges_ = Eigen::MatrixXd::Zero(m, columns);
   M_ = Eigen::MatrixXd::Zero(all, all);
   for (Index a = 0; a < nc; ++a) {
-    B_(D * a, a) = unit[a];
+    edges_(D * a, 0) = unit[a];
     const Cone cone(problem.friction, a);
     for (int g = 0; g < Cone::groups; ++g) {
       const Eigen::Index slip = reactions + a * Cone::groups + g;
@@ -54,31 +55,51 @@ Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(pr
         const Eigen::Index at = nc + a * of_contact + first[g] + k;
         const double angle = 2 * std::numbers::pi * k / corners[g];
         const auto row = D * a + Cone::start(g);
-        B_(row, at) = unit[a] * std::cos(angle);
-        if (Cone::size(g) > 1) B_(row + Cone::size(g) - 1, at) = unit[a] * std::sin(angle);
+        const Eigen::Index column = 1 + first[g] + k;
+        edges_(row, column) = unit[a] * std::cos(angle);
+        if (Cone::size(g) > 1) edges_(row + Cone::size(g) - 1, column) = unit[a] * std::sin(angle);
         M_(at, slip) = 1;
         M_(slip, at) = -1;
       }
     }
   }
-  const Vector zero = Vector::Zero(m);
-  Eigen::MatrixXd image(m, reactions);
-  Vector column(m);
-  for (Eigen::Index k = 0; k < reactions; ++k) {
-    problem.W.multiply_add(B_.col(k), zero, column);
-    image.col(k) = column;
-  }
-  M_.topLeftCorner(reactions, reactions).noalias() = B_.transpose() * image;
+  // B^T W B, block by block
+  const auto edges_of = [&](Index a) { return edges_.template middleRows<D>(D * a); };
+  Eigen::MatrixXd image(D, columns);
+  Eigen::MatrixXd product(columns, columns);
+  problem.W.template for_each_block<D>([&](Index a, Index b, const auto& w) {
+    image = w.lazyProduct(edges_of(b));
+    product = edges_of(a).transpose().lazyProduct(image);
+    const Eigen::Index row = nc + a * of_contact;
+    const Eigen::Index col = nc + b * of_contact;
+    M_(a, b) = product(0, 0);
+    M_.row(a).segment(col, of_contact) = product.row(0).tail(of_contact);
+    M_.col(b).segment(row, of_contact) = product.col(0).tail(of_contact);
+    M_.block(row, col, of_contact, of_contact) = product.bottomRightCorner(of_contact, of_contact);
+  });
   Q_ = Vector::Zero(all);
-  Q_.head(reactions) = B_.transpose() * problem.q;
+  for (Index a = 0; a < nc; ++a) {
+    const Vector own = edges_of(a).transpose() * problem.q.template segment<D>(D * a);
+    Q_[a] = own[0];
+    Q_.segment(nc + a * of_contact, of_contact) = own.tail(of_contact);
+  }
 }
 
 template <class Cone>
-int Pivoting<Cone>::solve(const Vector& cover, int most, Vector& r) const {
+double Pivoting<Cone>::bytes(const ReducedProblem& problem, int edges) {
+  Eigen::Index unknowns = 1 + Cone::groups;  // of a contact
+  for (int g = 0; g < Cone::groups; ++g) unknowns += Cone::size(g) == 1 ? 2 : edges;
+  const auto n = static_cast<double>(problem.nc() * unknowns);
+  return sizeof(double) * (n * n + n * (2 * n + 2));
+}
+
+template <class Cone>
+int Pivoting<Cone>::solve(const Vector& cover, int most, FunctionRef<bool(int)> stop,
+                          Vector& r) const {
   const Eigen::Index n = size();
   const double scale = Q_.template lpNorm<Eigen::Infinity>();
   r = Vector::Zero(problem_.m());
-  if (!(scale > 0)) return 0;
+  if (!(scale > 0) || stop(0)) return 0;
   // variables: w of n rows, z of n rows, z0; w - M z - cover z0 = Q
   const Eigen::Index artificial = 2 * n;
   const Eigen::Index right = 2 * n + 1;
@@ -107,6 +128,7 @@ int Pivoting<Cone>::solve(const Vector& cover, int most, Vector& r) const {
     tableau(row, entering) = 1;
     const Eigen::Index leaving = std::exchange(basis[static_cast<std::size_t>(row)], entering);
     if (leaving == artificial) break;
+    if (stop(pivots)) return pivots;
     entering = leaving < n ? leaving + n : leaving - n;
 
     // the ratio test; of equal ratios, that of z0 or else the one with the largest pivot
@@ -133,7 +155,13 @@ int Pivoting<Cone>::solve(const Vector& cover, int most, Vector& r) const {
     const Eigen::Index variable = basis[static_cast<std::size_t>(k)];
     if (variable >= n && variable < artificial) x[variable - n] = scale * tableau(k, right);
   }
-  r = B_ * x.head(B_.cols());
+  const Eigen::Index nc = problem_.nc();
+  const Eigen::Index of_contact = edges_.cols() - 1;
+  for (Index a = 0; a < nc; ++a) {
+    const auto own = edges_.template middleRows<D>(D * a);
+    r.template segment<D>(D * a) =
+        own.col(0) * x[a] + own.rightCols(of_contact) * x.segment(nc + a * of_contact, of_contact);
+  }
   return pivots;
 }
 

@@ -16,6 +16,7 @@
 #pragma once
 
 #include "contact/cones.hpp"
+#include "function_ref.hpp"
 #include "reduced/reduced_problem.hpp"
 
 namespace fclib {
@@ -31,13 +32,19 @@ class Pivoting {
   /// The number of unknowns of the complementarity problem.
   [[nodiscard]] Eigen::Index size() const { return M_.rows(); }
 
+  /// [bytes] What the two dense matrices of such a problem take.
+  static double bytes(const ReducedProblem& problem, int edges);
+
   /// Runs Lemke's method from a covering vector (size, positive), at most `most` pivots. r (m)
-  /// becomes its end: a solution or a point of a ray. Returns the number of pivots.
-  int solve(const Vector& cover, int most, Vector& r) const;
+  /// becomes its end: a solution or a point of a ray. Returns the number of pivots. `stop` is asked
+  /// between pivots and gets the number of those made; if it returns true, r is zero.
+  int solve(const Vector& cover, int most, FunctionRef<bool(int pivots)> stop, Vector& r) const;
 
  private:
   const ReducedProblem& problem_;
-  Eigen::MatrixXd B_;  // (m x x), scaled by contacts
+  /// (m x 1 + corners of a contact) The rows of B of each contact, without its zeros: the normal,
+  /// then the edges; scaled by contacts.
+  Eigen::MatrixXd edges_;
   Eigen::MatrixXd M_;
   Vector Q_;
 };

@@ -557,6 +557,16 @@ Result solve_consistent(const P& given, const Request& request, const Solution& 
   return result;
 }
 
+/// The last report is of an iterate that may be another than the result, or be measured on another
+/// form of the problem. So the history ends with the result.
+void end_history(Result& result) {
+  if (!result.history || result.history->empty()) return;
+  const HistoryPoint last = result.history->back();
+  if (last.error == result.error || !std::isfinite(result.error)) return;
+  result.history->push_back(
+      {result.iterations, result.error, std::max(last.time, result.time), last.stage});
+}
+
 /// What every solve does: checks and times, and a second solve from what the caller prefers.
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
@@ -570,6 +580,7 @@ Result solve_any(const P& problem, const Solver& solver, const Settings& setting
     const Request request{solver, settings, options, deadline, watch, kept};
     require_solvable(problem, request.solver, start);
     Result result = form(problem, request, start);
+    end_history(result);
     // the time of the thread in the solver is already taken off
     result.setup_s += watch.read().cpu;
     return result;

@@ -34,7 +34,8 @@ struct Result {
   std::vector<Stage> stages;  ///< of solvers that chain others, in the last attempt
   std::string solver;
   std::string message;  ///< what a user should know, in words; mostly empty
-  std::optional<std::vector<HistoryPoint>> history;  ///< if the settings ask for it
+  std::optional<std::vector<HistoryPoint>> history;  ///< if the settings ask for it: all reports,
+                                                     ///< then the error of the result
 
   [[nodiscard]] bool converged() const { return status == Status::converged; }
 };

@@ -127,7 +127,7 @@ bool CoupledSystem::factorise() {
   } else {
     with_dimension(problem_.d(), [&](auto D) { fill_contacts<D>(); });
   }
-  return lu_.factorise(values_);
+  return lu_.factorise(values_, problem_.deadline);
 }
 
 void CoupledSystem::apply(const std::vector<double>& blocks, const Vector& x, Vector& y) const {

@@ -215,7 +215,10 @@ def _beyond(group: _laws.Group, z: Array) -> Array:
         return np.asarray(np.linalg.norm(part, axis=1) - group.coefficient * z[:, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(part == 0, 0.0, part / group.axes)
-    far = group.axes.max(axis=1) * (np.linalg.norm(shares, axis=1) - z[:, 0])
+    largest = group.axes.max(axis=1)
+    far = np.linalg.norm(part, axis=1)  # if nothing may slide or spin
+    some = largest > 0
+    far[some] = largest[some] * (np.linalg.norm(shares[some], axis=1) - z[some, 0])
     return np.asarray(far)
 
 

@@ -101,7 +101,9 @@ def groups(problem: Problem) -> list[Group]:
 
 def coefficients(problem: Problem) -> dict[str, Array]:
     """The coefficients of friction by their names, each (nc)."""
-    return {name: getattr(problem, name) for name in names(problem.kind, problem.spacedim)}
+    known = {name: getattr(problem, name) for name in names(problem.kind, problem.spacedim)}
+    # mu_r of no contacts is not there
+    return {name: np.zeros(0) if bound is None else bound for name, bound in known.items()}
 
 
 def names(kind: str, d: int) -> list[str]:

@@ -63,7 +63,8 @@ def solve(
         callback: called as ``callback(iteration, error, seconds, stage)`` each time the solver
             evaluates its error; returning False stops it. ``stage`` is empty, except for solvers
             that chain others, for example ``auto``.
-        history: whether ``Result.history`` keeps all calls of a callback.
+        history: whether ``Result.history`` keeps all calls of a callback. It ends with the error of
+            the result.
         merit: what ``tol`` bounds: ``both`` the natural map and the scaled one, which is the same
             in any units, or ``natural`` alone, to compare with the literature.
         **options: the solver's own options, see ``fclib solvers``. A text may be given by the path

@@ -6,6 +6,7 @@ Problems are made from bodies with a planted solution, so that each of them has 
 from __future__ import annotations
 
 import pickle
+import time
 from pathlib import Path
 from typing import Any
 
@@ -577,6 +578,55 @@ def test_limits_hold_in_own_units() -> None:
         return count[0] < 4
 
     assert fclib.solve(problem, chain=chain, callback=stop).status == "interrupted"
+
+
+def many_dense_contacts(nc: int) -> fclib.LocalProblem:
+    rng = np.random.default_rng(0)
+    H = rng.normal(size=(nc, 3 * nc))
+    return fclib.LocalProblem(W=H.T @ H, q=rng.normal(size=3 * nc), mu=np.full(nc, 0.7))
+
+
+@pytest.mark.parametrize("before", ["", "sweeps : gauss_seidel limit=1; "])
+def test_pivots_end_when_the_time_is_over(before: str) -> None:
+    problem, chain = many_dense_contacts(200), before + "a : pivoting; own : own_units range=1"
+    result = fclib.solve(problem, chain=chain, time_limit=0.2)
+    assert result.status == "time_limit"
+    assert result.iterations < 900  # the first covering vector alone takes 1000 pivots of 10 ms
+    seen: list[float] = []
+
+    def stop(*report: Any) -> bool:
+        seen.append(report[1])
+        return len(seen) < 2 + bool(before)
+
+    result = fclib.solve(problem, chain=chain, callback=stop)
+    assert result.status == "interrupted"
+    assert result.iterations < 900
+
+
+def test_a_tableau_that_does_not_fit_into_memory_is_not_made() -> None:
+    problem = many_dense_contacts(100)
+    result = fclib.solve(problem, chain="a : pivoting", memory_limit=0.005)
+    assert (result.status, result.iterations) == ("stalled", 0)
+    assert "do not fit into 0.005 GB" in result.message
+
+
+def test_random_starts_end_when_the_time_is_over() -> None:
+    chain = "a : random_starts tries=1000000"
+    start = time.perf_counter()
+    result = fclib.solve(many_dense_contacts(100), chain=chain, time_limit=0.05)
+    assert result.status == "time_limit"
+    assert time.perf_counter() - start < 20  # a million starts without a factorisation take minutes
+
+
+# what the polish of the last pivots finds takes no iteration
+@pytest.mark.parametrize("number", [24, 123, 205, 245])
+def test_the_history_ends_with_the_error_of_the_result(number: int) -> None:
+    result = fclib.solve(planted(number)[0], history=True)
+    assert result.converged
+    assert result.history is not None
+    assert result.history[-1][1] == result.error
+    assert (np.diff(result.history["time"]) >= 0).all()
+    assert result.history[-1][0] == result.iterations
 
 
 @pytest.mark.parametrize("method", ["sweep_on", "spectral_gradient"])

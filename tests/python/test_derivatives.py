@@ -139,6 +139,32 @@ def test_borders_are_flagged_with_the_derivative_of_one_side() -> None:
     assert fclib.jvp(grazing, np.zeros(3), q=[1, 0, 0]).degenerate.all()
 
 
+def test_an_ellipsoid_without_friction_has_the_derivative_of_none() -> None:
+    spin = fclib.LocalSpinProblem(
+        spacedim=4, W=np.eye(4), q=[-1, 0.7, 0, 1], mu=[0], mu_s=[0], coupled=True
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tangent = fclib.jvp(spin, [1, 0, 0, 0], q=np.ones(4))
+    np.testing.assert_allclose(tangent.r, [-1, 0, 0, 0])
+    assert not tangent.degenerate.any()
+    at_rest = spin.replace(q=[-1, 0, 0, 0])
+    assert fclib.jvp(at_rest, [1, 0, 0, 0], q=np.ones(4)).degenerate.all()
+
+
+def test_no_contacts_have_derivatives_of_each_law() -> None:
+    none: dict[str, Any] = {"W": np.zeros((0, 0)), "q": [], "mu": []}
+    for problem in (
+        fclib.LocalProblem(**none),
+        fclib.LocalRollingProblem(**none, spacedim=5, mu_r=[]),
+        fclib.LocalSpinProblem(**none, spacedim=4, mu_s=[]),
+        fclib.LocalSpinProblem(**none, spacedim=6, mu_s=[], mu_r=[]),
+    ):
+        gradient = fclib.vjp(problem, fclib.solve(problem), r=[])
+        assert gradient.mu.shape == (0,)
+        assert gradient.unique
+
+
 def test_redundant_contacts_leave_u_determined() -> None:
     rng = np.random.default_rng(0)
     h = rng.normal(size=(3, 9))

@@ -396,6 +396,29 @@ def test_a_full_disk_leaves_the_confirmed_steps(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("size", ["600k", "1900k"])
+def test_a_full_disk_leaves_no_part_of_a_simulated_sequence(size: str, tmp_path: Path) -> None:
+    """It is full while problems are made, or while they go into one file."""
+    pytest.importorskip("mujoco")
+    disk = ["sh", "-c", f'mount -t tmpfs -o size={size} none "$0" && exec "$@"', str(tmp_path)]
+    apart = ["unshare", "--mount", "--map-root-user"]
+    if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
+        pytest.skip("no file system can be mounted")
+    scene = tmp_path.with_suffix(".xml")
+    scene.write_text(
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body pos='0 0 .1'><freejoint/>"
+        "<geom size='.1'/></body></worldbody></mujoco>"
+    )
+    words = ["-m", "fclib", "simulate", "--steps", "100", "--out"]
+    script = '"$@"; echo "ended by $?"; ls -A "$0"'
+    command = [sys.executable, *words, str(tmp_path / "run.h5"), str(scene)]
+    done = subprocess.run(
+        [*apart, *disk, "sh", "-c", script, str(tmp_path), *command], capture_output=True, text=True
+    )
+    assert os.strerror(errno.ENOSPC) in done.stderr
+    assert done.stdout.splitlines()[-1] == "ended by 1"
+
+
 # ---- damaged and hostile files
 
 Change = Callable[[Any], None]

@@ -617,6 +617,34 @@ def test_a_number_that_the_compiler_replaces_is_said() -> None:
     assert any("NaN" in line for line in step.model.left_out)
 
 
+@pytest.mark.parametrize("bounds", ["", 'lower="1" upper="-1"', 'lower="1" upper="1"'])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_limits_that_the_compiler_drops_are_said(kind: str, bounds: str, tmp_path: Path) -> None:
+    moments = "ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'"
+    inertial = f"<inertial><mass value='1'/><inertia {moments}/></inertial>"
+    path = tmp_path / "arm.urdf"
+    text = (
+        f"<robot name='arm'><link name='base'/><link name='arm'>{inertial}</link>"
+        f"<joint name='elbow' type='{kind}'><parent link='base'/><child link='arm'/>"
+        f"<axis xyz='0 1 0'/><limit effort='1' velocity='1' {bounds}/></joint></robot>"
+    )
+    path.write_text(text)
+    said = "limits of elbow (the lower is not below the upper: none is there)"
+    (step,) = simulate(Scene.from_file(path), 1)
+    assert said in step.model.left_out
+    (step,) = simulate(Scene.from_file(path, ignore=("limits",)), 1)
+    assert said not in step.model.left_out
+    path.write_text(text.replace(bounds, "") if bounds else text)
+    path.write_text(path.read_text().replace("effort", "lower='-1' upper='1' effort"))
+    (step,) = simulate(Scene.from_file(path), 1)
+    assert step.model.left_out == ()
+    if bounds:
+        upper = bounds.split('"')[-2]
+        arm = f'<body><joint name="elbow" range="1 {upper}"/><geom size="0.1" mass="1"/></body>'
+        (step,) = run(document(arm), 1)
+        assert said in step.model.left_out
+
+
 def test_a_robot_floats_above_a_ground(robot: Path) -> None:
     fixed = next(simulate(Scene.from_file(robot), 1)).model
     assert isinstance(fixed, MujocoModel)

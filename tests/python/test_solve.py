@@ -390,7 +390,9 @@ def test_a_guess_that_is_the_solution_is_returned(law: str) -> None:
     assert again.cpu_s > 0
     assert again.setup_s > 0
     # who listens hears of it
-    assert fclib.solve(problem, guess=known.solution, history=True).history
+    heard = fclib.solve(problem, guess=known.solution, history=True).history
+    assert heard is not None
+    assert len(heard) > 0
     for off in (1e-6, 1e-2):
         near = fclib.Solution(r=known.solution.r * (1 + off))
         better = fclib.solve(problem, tol=1e-8, guess=near)
@@ -439,6 +441,22 @@ def test_invalid_problems_are_not_solved() -> None:
     ):
         with pytest.raises(fclib.ProblemError):
             fclib.solve(problem)
+
+
+@pytest.mark.parametrize("name", ["W", "V", "R"])
+@pytest.mark.parametrize("form", [sp.coo_array, sp.csc_array, sp.csr_array])
+def test_entries_whose_sum_is_infinite_are_bad_input(name: str, form: Any) -> None:
+    places = ([0, 0, 1, 2], [0, 0, 1, 2])
+    large = sp.coo_array(([1e308, 1e308, 1.0, 1.0], places), shape=(3, 3))
+    if form is not sp.coo_array:  # its own conversion adds them up
+        pointers = np.array([0, 2, 3, 4])
+        large = form((large.data, np.array(places[0]), pointers), shape=(3, 3))
+    eye: dict[str, Any] = {"W": np.eye(3), "V": np.eye(3), "R": -np.eye(3)}
+    problem = fclib.LocalProblem(**(eye | {name: large}), q=-np.ones(3), mu=[1.0], s=np.zeros(3))
+    words = rf"{name}/x\[0\]: the sum of the entries in row 0, column 0 is not a finite number"
+    for use in (fclib.solve, fclib.LocalProblem.validate):
+        with pytest.raises(fclib.ProblemError, match=words):
+            use(problem)
 
 
 def test_contradicting_bilateral_constraints_are_unsuitable() -> None:

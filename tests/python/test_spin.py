@@ -12,7 +12,7 @@ import pytest
 
 import fclib
 from ball_judge import judge
-from fclib import _laws
+from fclib import _laws, analysis
 from fclib.analysis._certificate import _at_least_roots, _outside
 from helpers import SPIN_LAWS, as_global, dense
 from helpers import planted_spin as planted
@@ -197,3 +197,24 @@ def test_a_number_is_compared_with_roots_exactly() -> None:
             assert _at_least_roots(total, squares)
             assert _at_least_roots(total + Fraction(1, 10**30), squares)
             assert not _at_least_roots(total - Fraction(1, 10**30), squares)
+
+
+@pytest.mark.parametrize(("mu", "mu_s"), [(0.0, 2.0**20), (0.0, 0.25), (0.25, 0.0)])
+def test_an_ellipsoid_that_is_a_segment_or_a_disk_is_analysed(mu: float, mu_s: float) -> None:
+    """What slides or spins there meets no resistance, and says nothing of the rest."""
+    H = np.eye(4)[:, [0, 1, 2, 3, 0, 1, 2, 3]]  # two contacts at one place
+    problem = fclib.LocalSpinProblem(
+        spacedim=4,
+        W=H.T @ H,
+        q=np.tile([-1, 0.7 * (mu == 0), 0, 0.7 * (mu_s == 0)], 2),
+        mu=[mu, mu],
+        mu_s=[mu_s, mu_s],
+        coupled=True,
+    )
+    for share in (0.0, 0.5):  # of the second contact: reactions are not unique
+        solution = fclib.Solution(r=[1 - share, 0, 0, 0, share, 0, 0, 0])
+        assert fclib.merit(problem, solution).error == 0
+    found = analysis.analyze(problem, time_limit=1.0)
+    assert found.reactions.verdict != "unique"
+    alone = problem.replace(W=np.eye(4), q=problem.q[:4], mu=problem.mu[:1], mu_s=problem.mu_s[:1])
+    assert analysis.analyze(alone, time_limit=1.0).existence.verdict[:6] == "exists"

@@ -141,7 +141,8 @@ def faces_of(data: Data, solution: _core.Solution, error: float) -> Faces:
             borne = np.flatnonzero(axes > 0)
             if not borne.size:
                 continue
-            moving, pull = speed[a, group.part], reaction[a, group.part]
+            # what meets no resistance says nothing of the others
+            moving, pull = speed[a, group.part] * (axes > 0), reaction[a, group.part]
             components = np.arange(d)[group.part]
             if float(np.linalg.norm(moving)) > threshold:
                 # against the sliding, on the boundary of the section r_N = 1

@@ -58,7 +58,8 @@ def build_plans(
 ) -> None:
     """Build plans, and print the results; exit status 1 if a problem was not solved.
 
-    With `sequence` the problems go from the folder into that file, and the folder is removed.
+    With `sequence` the problems go from the folder into that file, and the folder is removed, also
+    after an error. A build that is killed or interrupted leaves it, and goes on from it.
     """
     told = [plan.name for plan in plans if plan.trajectory is None and simulated(plan)]
     if told:
@@ -77,6 +78,8 @@ def build_plans(
                 pictures=pictures,
             )
     except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError, OSError) as error:
+        if sequence is not None and not isinstance(error, BuildError):
+            shutil.rmtree(folder, ignore_errors=True)
         fail(words_of(error))
     mine = {plan.name for plan in plans}
     rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
@@ -120,9 +123,10 @@ def build_plans(
     if sequence is not None:
         try:
             collections.write_sequence(sequence, folder, rows)
-            shutil.rmtree(folder)
         except OSError as error:
             fail(words_of(error))
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
         if not as_json:
             out.print(f"The sequence:  {sequence}")
     raise typer.Exit(int(report.failed))

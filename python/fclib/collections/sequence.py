@@ -75,21 +75,26 @@ def sequence(
 def write_sequence(path: Path, folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """Write problems of a built folder into one file, in the order of their steps.
 
+    The file is written in that folder. It takes its place as a whole.
+
     Args:
-        path: the file.
+        path: the file, on the disk of the folder.
         folder: what was built.
         rows: those of its catalogue, each of one form.
 
     Raises:
         fclib.FileError: a file cannot be read or written.
     """
-    with _core.SequenceWriter(path) as writer:
+    beside = folder / path.name
+    beside.unlink(missing_ok=True)  # of a writer that was killed
+    with _core.SequenceWriter(beside) as writer:
         for row in sorted(rows, key=lambda row: int(row["step"])):
             (name,) = (name for name, _ in files_of(dict(row)))
             file = folder / name
             solution = _core.read_solution(file)
             told = _core.read_attributes(file, "solution") if solution is not None else {}
             writer.append(_core.read(file), solution, _core.read_guesses(file), attributes=told)
+    beside.replace(path)
 
 
 def _recorded(steps: _sequence.Sequence) -> Iterator[Step]:

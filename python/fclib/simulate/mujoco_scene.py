@@ -12,11 +12,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
+from xml.etree import ElementTree
 
 import numpy as np
 
 from fclib.scenes import Scene
 from fclib.scenes.shared.condim import collides
+from fclib.scenes.shared.family import with_prefixes
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Vector
 from fclib.simulate.periodic import PeriodicCell, add_ghosts
@@ -257,6 +259,11 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     differs |= (m.pair_dim == 6) & (m.pair_friction[:, 3] != m.pair_friction[:, 4])
     if differs.any() and "anisotropy" not in scene.ignore:
         lost.append("anisotropic friction (the mean of two coefficients)")
+    free = without_range(scene, m)
+    if free and "limits" not in scene.ignore:
+        lost.append(
+            f"limits of {', '.join(free)} (the lower is not below the upper: none is there)"
+        )
     if softened(m, touching):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
     if softened_friction(m):
@@ -281,6 +288,27 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
     if m.nplugin:
         lost.append("plugins")
     return tuple(lost)
+
+
+def without_range(scene: Scene, m: Any) -> list[str]:
+    """The joints that have limits which MuJoCo drops, since the lower is not below the upper."""
+    if "<robot" not in scene.xml:
+        low, high = m.jnt_range.T
+        dropped = ~m.jnt_limited.astype(bool) & m.jnt_range.any(axis=1) & ~(low < high)
+        return [m.joint(int(joint)).name or str(joint) for joint in np.flatnonzero(dropped)]
+    try:
+        robot = ElementTree.fromstring(with_prefixes(scene.xml).encode())
+    except ElementTree.ParseError:  # MuJoCo reads more than XML
+        return []
+    found = []
+    for joint in robot.iter("joint"):
+        limit = joint.find("limit")
+        if joint.get("type") not in ("revolute", "prismatic") or limit is None:
+            continue
+        # by the standard of URDF a bound that is not there is 0
+        if not float(limit.get("lower", "0")) < float(limit.get("upper", "0")):
+            found.append(joint.get("name", ""))
+    return found
 
 
 # solref and solimp, MuJoCo's defaults

@@ -73,6 +73,27 @@ TEST(Matrix, validation_names_the_entry) {
   }
 }
 
+TEST(Matrix, a_sum_that_no_double_holds_is_named) {
+  const double half = 1e308;
+  Matrix a{.storage = Storage::triplet,
+           .rows = 2,
+           .cols = 2,
+           .p = {0, 0, 1, 1},
+           .i = {1, 0, 0, 0},
+           .x = {half, half, half, half},
+           .info = {}};
+  try {
+    validate(a, "/fclib_local/W");
+    FAIL() << "an infinite sum was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind, ErrorKind::problem);
+    EXPECT_EQ(error.where, "/fclib_local/W/x[2]");
+    EXPECT_EQ(error.message, "the sum of the entries in row 0, column 1 is not a finite number");
+  }
+  a.x[3] = -half;
+  validate(a, "W");
+}
+
 TEST(Matrix, a_triangle_stands_for_both) {
   testing::RandomData random(4);
   const SparseColumns source = random.sparse(6, 6, 0.5);

@@ -133,6 +133,25 @@ TEST(Multifrontal, RefusesWhatIsNotFinite) {
   EXPECT_FALSE(lu.factorise(values));
 }
 
+TEST(Multifrontal, StopsWhenTheTimeIsOver) {
+  testing::RandomData random(5);
+  for (const double share : {0.03, 1.0}) {  // many fronts, and a large one
+    const BlockPattern pattern = random_pattern(random, 60, 3, share);
+    const auto values = random_values(random, pattern, 60);
+    Multifrontal lu(pattern);
+    double time = 0;
+    const Clock clock = [&time] { return time += 1; };  // a second passes at each look
+    const Deadline enough(1000, clock);
+    ASSERT_TRUE(lu.factorise(values, &enough));
+    const double looks = time;
+    ASSERT_GT(looks, 3);
+    time = 0;
+    const Deadline half(looks / 2, clock);
+    EXPECT_FALSE(lu.factorise(values, &half));
+    EXPECT_LT(time, looks);
+  }
+}
+
 TEST(Multifrontal, FillsLittleOnAChain) {
   BlockPattern pattern;
   pattern.d = 3;

@@ -294,7 +294,7 @@ def test_refuses_a_guess_that_is_not_finite(solver: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_history_is_what_the_callback_was_told(solver: str) -> None:
+def test_the_history_is_what_the_callback_was_told_and_the_result(solver: str) -> None:
     for form in forms(solver):
         problem = problem_of("ten contacts", form)
         told: list[tuple[int, float]] = []
@@ -305,7 +305,11 @@ def test_the_history_is_what_the_callback_was_told(solver: str) -> None:
         result = fclib.solve(problem, solver, 1e-6, history=True, callback=callback)
         with about(form):
             assert result.history is not None
-            assert [(row["iteration"], row["error"]) for row in result.history] == told
+            history = [(row["iteration"], row["error"]) for row in result.history]
+            # then the result, whose error is that of the problem as given
+            assert history[: len(told)] == told
+            assert history[len(told) :] in ([], [(result.iterations, result.error)])
+            assert history[-1][1] == result.error
             assert told
             iterations = [iteration for iteration, _ in told]
             assert iterations == sorted(iterations)

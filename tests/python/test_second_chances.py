@@ -295,7 +295,7 @@ def test_waiting_takes_time_and_no_cpu_time() -> None:
 
 def test_a_stage_counts_the_time_of_all_threads() -> None:
     problem: Any = Packing().of_size(2500, 0.0, 0)
-    result = fclib.solve(problem, threads=2, chain="a : proximal_point limit=30")
+    result = fclib.solve(problem, threads=2, chain="a : proximal_point limit=100")
     (stage,) = result.stages
     assert stage.factorisations > 0
     assert 0.9 * result.cpu_s < stage.cpu_s <= 1.01 * result.cpu_s

@@ -7,7 +7,7 @@
 The linear systems of `auto` on problems of these sizes: on the contacts (blocks of 3 x 3, linked
 if they share a body) and on the bodies. Only the pattern is the problem's; the numbers are
 random, with a dominant diagonal. CPU times of one thread, of a factorisation the least of three.
-Needs a C++ compiler, Eigen and METIS.
+Needs a C++ compiler, Eigen, METIS and the core that `make setup` builds.
 
 Of orderings, the column "ratio" is plan and factorisation by the better ordering over those by
 minimum degree, if a plan is used for --uses factorisations. "memory" is what a factorisation by
@@ -34,7 +34,7 @@ from fclib import scenes
 from workshop.tables import _results
 
 PROGRAM = Path(__file__).with_suffix(".cpp")
-PARTS = ("fronts", "multifrontal", "workers")
+CORE_LIBRARY = _results.ROOT / "build" / "libfclib_core.a"
 LIBRARIES = {"UMFPACK": ("umfpack.h", "umfpack"), "CHOLMOD": ("cholmod.h", "cholmod")}
 CORE = _results.ROOT / "core"
 INCLUDES = (CORE, "/usr/include/eigen3", "/usr/include/suitesparse")
@@ -45,7 +45,7 @@ ACCURATE = {"orderings": 1e-10, "libraries": 1e-8}
 
 def compiled(target: Path, source: Path, more: list[str]) -> bool:
     """Whether a source could be compiled and linked."""
-    flags = ["-std=c++20", "-O3", "-DNDEBUG", "-DFCLIB_METIS", "-pthread"]
+    flags = ["-std=c++20", "-O3", "-DNDEBUG", "-pthread"]
     flags += [f"-I{folder}" for folder in INCLUDES]
     done = subprocess.run(["c++", *flags, "-o", target, source, *more], capture_output=True)
     return done.returncode == 0
@@ -59,9 +59,11 @@ def built(folder: Path) -> Path:
         trial.write_text(f"#include <{header}>\nint main() {{}}\n")
         if compiled(folder / "trial", trial, [f"-l{library}"]):
             words += [f"-DWITH_{name}", f"-l{library}"]
-    sources = [str(CORE / "linalg" / f"{name}.cpp") for name in PARTS]
-    if not compiled(program, PROGRAM, [*sources, *words, "-lmetis"]):
-        raise SystemExit(f"{PROGRAM}: cannot be compiled: it needs a C++ compiler, Eigen and METIS")
+    if not compiled(program, PROGRAM, [str(CORE_LIBRARY), *words, "-lmetis"]):
+        raise SystemExit(
+            f"{PROGRAM}: cannot be compiled: it needs a C++ compiler, Eigen, METIS and"
+            f" {CORE_LIBRARY}"
+        )
     return program
 
 

@@ -30,8 +30,21 @@ void with_columns(const DenseView& b, const F& f) {
   }
 }
 
+/// Below this sum of sizes, and for one row, the sums of Eigen's products depend on where the
+/// numbers lie in memory: there the same problem would have other last digits from call to call.
+constexpr std::ptrdiff_t least_sizes = 20;
+
 void subtract_product(DenseView c, DenseView a, DenseView b) {
-  if (c.cols == 1) {
+  if (c.rows == 1 || c.rows + c.cols + a.cols < least_sizes) {
+    for (std::ptrdiff_t j = 0; j < c.cols; ++j) {
+      double* target = c.data + c.stride * j;
+      for (std::ptrdiff_t k = 0; k < a.cols; ++k) {
+        const double* source = a.data + a.stride * k;
+        const double factor = b.data[b.stride * j + k];
+        for (std::ptrdiff_t i = 0; i < c.rows; ++i) target[i] -= source[i] * factor;
+      }
+    }
+  } else if (c.cols == 1) {
     Column(c.data, c.rows).noalias() -= columns(a) * Column(b.data, b.rows);
   } else {
     columns(c).noalias() -= columns(a) * columns(b);

@@ -66,6 +66,37 @@ TEST(DenseKernels, ProductsAndTriangles) {
   }
 }
 
+/// The same numbers give the same bits wherever they lie.
+TEST(DenseKernels, DigitsDoNotDependOnTheAddress) {
+  testing::RandomData random(3);
+  for (const DenseKernels* kernels : all_kernels()) {
+    for (const Eigen::Index n : {1, 2, 3, 5, 6, 7, 12, 30}) {
+      for (const Eigen::Index m : {1, 2, 3, 6, 9, 25}) {
+        const Eigen::Index size = n + m;
+        MatrixXd numbers = random_matrix(random, size, size) / static_cast<double>(n);
+        for (Eigen::Index k = 0; k < n; ++k) numbers(k, k) += 2;
+        MatrixXd first;
+        for (const Eigen::Index offset : {0, 1, 2, 3, 4, 5, 6, 7}) {
+          std::vector<double> memory(static_cast<std::size_t>(size * size + offset));
+          Eigen::Map<MatrixXd> a(memory.data() + offset, size, size);
+          a = numbers;
+          const DenseView triangle = view(a.block(0, 0, n, n));
+          std::vector<int> exchanged(static_cast<std::size_t>(n));
+          ASSERT_TRUE(kernels->eliminate(triangle, 0, n, 0.0, exchanged.data()));
+          const DenseView right = view(a.block(0, n, n, m));
+          const DenseView below = view(a.block(n, 0, m, n));
+          kernels->solve_unit_lower(triangle, right);
+          kernels->solve_upper_from_right(triangle, below);
+          kernels->subtract_product(view(a.block(n, n, m, m)), below, right);
+          kernels->solve_upper(triangle, right);
+          if (offset == 0) first = a;
+          EXPECT_EQ(first, a) << n << " " << m << " " << offset;
+        }
+      }
+    }
+  }
+}
+
 TEST(DenseKernels, EliminationIsThatOfEigen) {
   testing::RandomData random(2);
   for (const DenseKernels* kernels : all_kernels()) {

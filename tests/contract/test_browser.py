@@ -22,6 +22,19 @@ from helpers import local_problem, planted_global, planted_local
 pytestmark = pytest.mark.skipif(bool(browser_module.missing()), reason=browser_module.missing())
 # numbers of types that h5wasm makes no arrays of: refused in a page, and read natively
 NOT_IN_PAGES = {"halves", "long doubles"}
+FACTORISE = {
+    "admm",
+    "associated",
+    "auto",
+    "fp-ds",
+    "homotopy",
+    "nsip",
+    "nsn-ac",
+    "nsn-fb",
+    "nsn-jm",
+    "nsn-nm",
+    "ppa-nsn",
+}
 TINY = sorted(golden_work.TINY.glob("*/*.hdf5"))
 
 
@@ -44,7 +57,8 @@ def test_every_solver_goes_the_same_way(browser: Module) -> None:
     wrong = browser_work.unexpected(found)
     assert not wrong, "\n".join(["if this is meant: python tests/browser_work.py --write", *wrong])
     assert {one.pair.key for one in found} == set(golden_work.read())
-    assert sum(one.bits for one in found) > 0.7 * len(found)
+    # whatever the processor, sums differ in factorisations alone
+    assert all(one.bits for one in found if one.pair.solver not in FACTORISE)
     assert len(browser_work.read()) < 0.05 * len(found)
 
 

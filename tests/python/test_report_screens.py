@@ -249,6 +249,8 @@ def filters_closed(page: Any) -> bool:
 
 
 def test_the_profile_is_of_the_chosen_problems(go: Opener, site: Path) -> None:
+    from playwright.sync_api import expect  # with which `go` has opened the pages
+
     page = go("#/overview", viewport=DESK)
     plot = page.locator(".first .plot")
     plot.hover()
@@ -271,10 +273,8 @@ def test_the_profile_is_of_the_chosen_problems(go: Opener, site: Path) -> None:
     tables = read_data(site, "site")["headlines"][0]["tables"][""]
     table = page.locator("table", has_text="CPU times of the solvers")
     last = table.locator("tbody tr").last.locator("th, td")
-    page.wait_for_function(
-        "([cell, text]) => cell.textContent.trim() === text",
-        arg=[last.first.element_handle(), tables[-1]["solver"]],
-    )
+    # the page may draw the table again meanwhile
+    expect(last.first).to_have_text(tables[-1]["solver"], timeout=30_000)
 
 
 def test_the_overview_lists_no_families(go: Opener, site: Path) -> None:

@@ -30,8 +30,9 @@ void with_columns(const DenseView& b, const F& f) {
   }
 }
 
-/// Below this sum of sizes, and for one row, the sums of Eigen's products depend on where the
-/// numbers lie in memory: there the same problem would have other last digits from call to call.
+/// Below this sum of sizes (Eigen's EIGEN_GEMM_TO_COEFFBASED_THRESHOLD), and for one row, Eigen
+/// sums products in an order that depends on the address. The same problem would get other last
+/// digits from call to call.
 constexpr std::ptrdiff_t least_sizes = 20;
 
 void subtract_product(DenseView c, DenseView a, DenseView b) {

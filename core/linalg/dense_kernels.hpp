@@ -27,7 +27,7 @@ struct DenseKernels {
   void (*solve_upper_from_right)(DenseView u, DenseView b);
   /// Gaussian elimination of the columns from start to end of a square matrix, in these columns,
   /// with exchanges of whole rows: row k and row exchanged[k]. A pivot of at most `tiny` is
-  /// replaced by it. Returns false if an entry is not finite.
+  /// replaced by it. Returns false if a pivot is infinite.
   bool (*eliminate)(DenseView a, std::ptrdiff_t start, std::ptrdiff_t end, double tiny,
                     int* exchanged);
 };

@@ -776,24 +776,26 @@ def test_sets_of_the_collection_are_named() -> None:
 
 def test_a_set_that_is_built_in_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
+    from fclib.bench import generated
     from fclib.collections import library
 
     folders = library.Collection("tiny").folders
     there, built = set(folders[:3]), []
 
-    def build(name: str, folder: Path, progress: Any = None) -> None:
-        for done in range(5 if progress else 0):
-            progress(name, done, 5)
-        built.append(name)
+    def build(plan: Any, progress: Any) -> library.Collection:
+        for done in range(5):
+            progress(plan.name, done, 5)
+        built.append(plan.name)
+        return library.Collection(plan.name)
 
     monkeypatch.setattr(library, "is_there", lambda name, folder: name in there)
-    monkeypatch.setattr(library, "ensure", build)
+    monkeypatch.setattr(generated, "_alone", build)
     said: list[str] = []
     campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
     # those that were asked for and are not there, and no others
-    assert built[: len(folders) - 3] == folders[3:]
+    assert built == folders[3:]
     assert said[0].startswith(f"set tiny: 3 of {len(folders)} families are in ")
-    assert "fclib collection build tiny --out " in said[0]
+    assert "fclib collection build tiny --no-references --out " in said[0]
     # a word for each family at once, and not one for each problem
     assert said[1:-1] == [
         f"family {k} of {len(folders) - 3}: {name}, 0 of 5 problems"
@@ -827,6 +829,12 @@ def test_a_sample_of_a_family_is_built_alone(
     plan = campaign(problems=[{"set": "decks/ElasticCubes", "sample": 1}], **settings).plan()
     assert [job.problem.nc > 0 for job in plan] == [True]
     assert len(list(tmp_path.rglob("*-global.hdf5"))) == 5
+    # and of a whole set
+    plan = campaign(problems=["set:simulators/PyBulletBoxes"], **settings).plan()
+    files = sorted({Path(job.problem.path) for job in plan})
+    assert len(files) == len(fclib.collections.plan_of("simulators/PyBulletBoxes").numbers())
+    assert [fclib.read_solution(file) for file in files] == [None] * len(files)
+    assert not (tmp_path / "collection").exists()
 
 
 def test_files_of_a_set_that_is_not_built_name_the_command(

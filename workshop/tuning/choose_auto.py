@@ -14,8 +14,9 @@ ones only judge. At most --problems of a family are taken, evenly spread.
 A change is the table without one of its stages, or with another rule (CHANGES). It is run on the
 problems that came to the stage, each beside the table as it is, in one process; the others take the
 same path. A row says how many problems came to the stage and how many it solved; how many the chain
-solves without the change and with it; and the sum of CPU times with the change over that without
-it, with the 95 % interval of 2,000 bootstrap samples of the problems. The limit is one of CPU time;
+solves without the change and with it; the shifted geometric mean of the ratios of CPU times, over the problems that both solve; and
+the sum of CPU times with the change over that without it, with the 95 % interval of 2,000 bootstrap
+samples of the problems. The limit is one of CPU time;
 a failure counts as twice the limit. Where both take the same path, they cost the same. A stage pays
 if problems are lost without it, or if its interval is above 1.
 
@@ -308,7 +309,7 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
             for value in values
         ]
-    for value in (1e-6, 1e-5, 1e-3):
+    for value in (1e-6, 1e-4, 1e-3):
         change = with_rules(at, polish=f"{value:g}")
         result.append(Change(f"{first}: polish={value:g}", first, change))
     sweeps = place(lines, "gauss-seidel")
@@ -476,6 +477,7 @@ class Row:
     solved_changed: int
     lost: int  # solved by the table alone
     won: int
+    mean: float  # shifted geometric mean of the ratios, if both solve
     ratio: float  # sums of CPU times, the change over the table
     low: float  # ends of the 95 % interval
     high: float
@@ -492,6 +494,7 @@ class Row:
             "solved with the change": self.solved_changed,
             "lost": self.lost,
             "won": self.won,
+            "mean ratio": self.mean,
             "CPU ratio": self.ratio,
             "from": self.low,
             "to": self.high,
@@ -509,6 +512,19 @@ def interval(base: Sequence[float], changed: Sequence[float]) -> tuple[float, fl
     ratios = np.array(changed)[pick].sum(axis=1) / np.array(base)[pick].sum(axis=1)
     low, high = np.percentile(ratios, [2.5, 97.5])
     return float(low), float(high)
+
+
+def mean_ratio(base: Sequence[Run], changed: Sequence[Run]) -> float:
+    """The shifted geometric mean of the ratios of CPU times, if both solve."""
+    both = [
+        (b.cpu_s, a.cpu_s)
+        for a, b in zip(base, changed, strict=True)
+        if a.solved and b.solved
+    ]  # fmt: skip
+    if not both:
+        return 1.0
+    new, old = np.array(both).T
+    return float(np.exp(np.mean(np.log((new + SHIFT) / (old + SHIFT)))))
 
 
 def measured(
@@ -546,6 +562,7 @@ def measured(
         solved_changed=sum(run.solved for run in changed),
         lost=sum(a.solved and not b.solved for a, b in zip(base, changed, strict=True)),
         won=sum(b.solved and not a.solved for a, b in zip(base, changed, strict=True)),
+        mean=round(mean_ratio(base, changed), 3),
         ratio=round(sum(costs[1]) / sum(costs[0]), 3),
         low=round(low, 3),
         high=round(high, 3),
@@ -567,7 +584,7 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     for half in arguments.half:
         own = [run for p, run in found.items() if p.half == half]
         print(f"{half}: {len(own)} problems, {sum(run.solved for run in own)} solved")
-    print(f"{'change':46} {'half':7} entered there  solved   lost  won  CPU ratio")
+    print(f"{'change':46} {'half':7} entered there  solved   lost  won   mean  CPU ratio")
     rows = []
     for change in rule_changes(lines) if arguments.rules else changes(lines):
         if arguments.only and not any(word in change.name for word in arguments.only):
@@ -580,6 +597,7 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
             print(
                 f"{row.change:46} {row.half:7} {row.entered:7} {row.solved_there:5} "
                 f"{row.solved:3} > {row.solved_changed:3} {row.lost:5} {row.won:4}  "
+                f"{row.mean:.3f}  "
                 f"{row.ratio:.3f} [{row.low:.3f}, {row.high:.3f}]",
                 flush=True,
             )

@@ -9,7 +9,7 @@ that has a worker forked, hands it a job, watches its time and memory, and judge
 
 campaign.py     makes jobs of a TOML file. Needs problems.py, generated.py, modules.py
 problems.py     the files that a campaign names, and what the campaign knows of each problem
-generated.py    problems that a campaign has made: steps of a scene, random ones
+generated.py    problems that a campaign has made: of the collection, steps of a scene, random ones
 modules.py      files of Python with solvers of the user's own
 fingerprint.py  what tells two versions of a solver apart
 job.py          what travels: a job there, a record back, and the statuses of a record

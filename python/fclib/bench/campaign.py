@@ -393,7 +393,7 @@ class Campaign:
             paths += generated.stored(group.set, group.form, steps.start, steps.count, steps.stride)
         elif group.set:
             part = generated.sampled(group.set, group.form, group.sample, tell)
-            paths += part or problems.of_set(group.set, group.form, tell)
+            paths += part or generated.of_set(group.set, group.form, tell)
         if group.simulate is not None:
             paths += generated.simulated(
                 family=group.simulate["family"],

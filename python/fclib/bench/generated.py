@@ -1,4 +1,4 @@
-"""Small problems that a campaign makes: steps of a scene, and random ones around a solution.
+"""Problems that a campaign makes: of the collection, steps of a scene, random ones.
 
 They go into a cache folder. The folder's name says how they were made, so that each is made once.
 The same recipe gives the same problems, bit for bit.
@@ -12,14 +12,23 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fclib import _core
-from fclib.bench.problems import SUFFIXES, now_and_then, sample
+from fclib._words import counted
+from fclib.bench.problems import SUFFIXES, sample
+
+if TYPE_CHECKING:
+    from fclib.collections.build import Progress
+    from fclib.collections.library import Collection
+    from fclib.collections.plan import Plan
+
+PATIENCE = 10.0  # [s] between two messages on the progress of a build
 
 
 def cache_folder() -> Path:
@@ -144,6 +153,49 @@ def stored(name: str, form: str | None, start: int, count: int | None, stride: i
     return files_of(recipe, make)
 
 
+def of_set(
+    name: str, form: str | None = None, tell: Callable[[str], None] = lambda _: None
+) -> list[Path]:
+    """The files of a set or family of the collection. What is missing is fetched, or built alone.
+
+    Args:
+        name: as ``fclib collection list`` prints it.
+        form: "global" or "local"; by default the global one of a problem that has both.
+        tell: called with the name of each build and its progress.
+
+    Raises:
+        fclib.Error: there is no such set, or it can neither be built nor fetched.
+        ImportError: the collection needs a package that is not there.
+    """
+    from fclib.collections import library, set_index
+
+    try:
+        found = library.Collection(name)
+        absent = [own for own in found.folders if not library.is_there(own, found.folder)]
+        if absent:
+            there = len(found.folders) - len(absent)
+            tell(
+                f"set {name}: {there} of {len(found.folders)} families are in {found.folder}; the"
+                " others are made now, once, without reference solutions:"
+                f" {', '.join(own.split('/')[-1] for own in absent)}. On several cores:"
+                f" fclib collection build {name} --no-references --out {found.folder}"
+            )
+        parts = []
+        for own in found.folders:
+            if own in absent and not os.environ.get(library.SOURCE):
+                which = f"family {absent.index(own) + 1} of {len(absent)}"
+                parts.append(_alone(set_index.plan_of(own), now_and_then(which, tell)))
+                continue
+            library.ensure(own, found.folder)
+            parts.append(library.Collection(own, found.folder))
+        if absent:
+            tell(f"set {name}: built")
+        return [part.path(k, form).resolve() for part in parts for k in range(len(part))]
+    except (KeyError, OSError) as error:
+        word = error.args[0] if isinstance(error, KeyError) else error
+        raise _core.Error(f"set {name}: {word}") from None
+
+
 def sampled(
     name: str, form: str | None, count: int | None, tell: Callable[[str], None]
 ) -> list[Path]:
@@ -163,7 +215,6 @@ def sampled(
         OSError, fclib.Error: the files cannot be written.
     """
     from fclib.collections import library, set_index
-    from fclib.collections.build import build
 
     if count is None or os.environ.get(library.SOURCE):
         return []
@@ -177,14 +228,33 @@ def sampled(
     numbers = plan.numbers().tolist()
     if plan.trajectory is None or count >= len(numbers):
         return []
-    # runs need no references, which take longer than they do
-    plan = dataclasses.replace(plan.only(sample(numbers, count)), references=False)
+    part = _alone(plan.only(sample(numbers, count)), now_and_then(f"a sample of {count}", tell))
+    return [part.path(k, form).resolve() for k in range(len(part))]
+
+
+def _alone(plan: Plan, progress: Progress) -> Collection:
+    """The problems of a plan in the cache, without references: these take longer than runs do."""
+    from fclib.collections import library
+    from fclib.collections.build import build
+
+    plan = dataclasses.replace(plan, references=False)
     digest = hashlib.sha256(plan.fingerprint().encode()).hexdigest()[:16]
     folder = cache_folder() / "samples" / digest
-    progress = now_and_then(f"a sample of {count}", tell)
     build([plan], folder, pictures=False, progress=progress)
-    part = library.Collection(name, folder)
-    return [part.path(k, form).resolve() for k in range(len(part))]
+    return library.Collection(plan.name, folder)
+
+
+def now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
+    """Tells the progress of a family's build: at its beginning, and every `PATIENCE` seconds."""
+    last_told = -PATIENCE
+
+    def show(name: str, done: int, total: int) -> None:
+        nonlocal last_told
+        if time.monotonic() - last_told >= PATIENCE:
+            last_told = time.monotonic()
+            tell(f"{which}: {name}, {done} of {counted(total, 'problem')}")
+
+    return show
 
 
 def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:

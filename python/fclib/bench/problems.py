@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,7 +20,6 @@ T = TypeVar("T")
 
 SUFFIXES = (".hdf5", ".h5")
 FORM = re.compile(r"(.+)-(global|local)")  # the stem of a file with one form of a problem
-PATIENCE = 10.0  # [s] between two messages on the progress of a build
 
 
 def files_of(
@@ -93,57 +91,6 @@ def _how_to_have(path: Path) -> str:
     family = f"/{parts[0]}" if parts and not any(c in parts[0] for c in "*?[") else ""
     folder = f" --out {library.default_folder()}"
     return f"; it is built by: fclib collection build {name}{family}{folder}"
-
-
-def of_set(
-    name: str, form: str | None = None, tell: Callable[[str], None] = lambda _: None
-) -> list[Path]:
-    """The files of a set or family of the collection; they are built or fetched if needed.
-
-    Args:
-        name: as ``fclib collection list`` prints it.
-        form: "global" or "local"; by default the global one of a problem that has both.
-        tell: called with the name of each build and its progress.
-
-    Raises:
-        fclib.Error: there is no such set, or it can neither be built nor fetched.
-        ImportError: the collection needs a package that is not there.
-    """
-    from fclib.collections import library
-
-    try:
-        found = library.Collection(name)
-        absent = [own for own in found.folders if not library.is_there(own, found.folder)]
-        if absent:
-            there = len(found.folders) - len(absent)
-            tell(
-                f"set {name}: {there} of {len(found.folders)} families are in {found.folder}; the"
-                f" others are built now, once: {', '.join(own.split('/')[-1] for own in absent)}."
-                f" On several cores: fclib collection build {name} --out {found.folder}"
-            )
-        for k, own in enumerate(absent):
-            library.ensure(
-                own, found.folder, now_and_then(f"family {k + 1} of {len(absent)}", tell)
-            )
-        if absent:
-            tell(f"set {name}: built")
-        return [found.path(k, form).resolve() for k in range(len(found))]
-    except (KeyError, OSError) as error:
-        word = error.args[0] if isinstance(error, KeyError) else error
-        raise _core.Error(f"set {name}: {word}") from None
-
-
-def now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
-    """Tells the progress of a family's build: at its beginning, and every `PATIENCE` seconds."""
-    last_told = -PATIENCE
-
-    def show(name: str, done: int, total: int) -> None:
-        nonlocal last_told
-        if time.monotonic() - last_told >= PATIENCE:
-            last_told = time.monotonic()
-            tell(f"{which}: {name}, {done} of {counted(total, 'problem')}")
-
-    return show
 
 
 def check_names(path: str, kind: str) -> None:

@@ -14,10 +14,10 @@ ones only judge. At most --problems of a family are taken, evenly spread.
 A change is the table without one of its stages, or with another rule (CHANGES). It is run on the
 problems that came to the stage, each beside the table as it is, in one process; the others take the
 same path. A row says how many problems came to the stage and how many it solved; how many the chain
-solves without the change and with it; the shifted geometric mean of the ratios of CPU times, over the problems that both solve; and
-the sum of CPU times with the change over that without it, with the 95 % interval of 2,000 bootstrap
-samples of the problems. The limit is one of CPU time;
-a failure counts as twice the limit. Where both take the same path, they cost the same. A stage pays
+solves without the change and with it; the shifted geometric mean of the ratios of CPU times, over
+the problems that both solve; and the sum of CPU times with the change over that without it, with
+the 95 % interval of 2,000 bootstrap samples of the problems. The limit is one of CPU time; a
+failure counts as twice the limit. Where both take the same path, they cost the same. A stage pays
 if problems are lost without it, or if its interval is above 1.
 
 --rules changes each number of the table instead, and each default that it uses: half and double, a

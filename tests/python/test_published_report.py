@@ -21,6 +21,7 @@ from fclib.collections.set_index import Choice
 from helpers_cli import invoke
 from workshop.tables import _results, published
 
+PLANTED = {"planted": {"count": 8, "contacts": 4, "seed": 1}, "family": "Chain"}
 PLAN = {
     "name": "small",
     "solvers": ["nsgs", "apgd", "nsn-ac"],
@@ -29,7 +30,7 @@ PLAN = {
     "repeats": 2,
     "repeated": 0.7,
     "renumber": True,
-    "problems": [{"planted": {"count": 8, "contacts": 4, "seed": 1}, "family": "Chain"}],
+    "problems": [PLANTED],
 }
 
 
@@ -143,17 +144,34 @@ def test_a_chosen_set_has_the_runs_that_chose_it(
 ) -> None:
     """Of its own problems alone, with the solvers of all parts that have them."""
     monkeypatch.setenv("FCLIB_CACHE", str(run / "cache"))
-    plan = {**PLAN, "name": "matrix", "solvers": ["psor"]}
-    bench.run_campaign(bench.Campaign.of(plan), tmp_path / "matrix.sqlite")
-    for name, store in (("candidates", run / "small"), ("matrix", tmp_path / "matrix")):
+    stores = {"candidates": run / "small"}
+    for name, solver in (("matrix", "psor"), ("matrix-peers", "admm")):
+        stores[name] = tmp_path / name
+        plan = {**PLAN, "name": name, "solvers": [solver]}
+        if name == "matrix-peers":  # on some problems so far
+            plan["problems"] = [{**PLANTED, "sample": 2}]
+        bench.run_campaign(bench.Campaign.of(plan), stores[name].with_suffix(".sqlite"))
+    of = {}
+    for name, store in stores.items():
         with bench.Store(store.with_suffix(".sqlite")) as opened:
             results.pack(opened, tmp_path / "parts", name, "fast")
-            digests = sorted({row["hash"] for row in opened.table()})
-    own = [Choice("Chain", {}, 0, k, k, digest) for k, digest in enumerate(digests[:3])]
+            of[name] = sorted({row["hash"] for row in opened.table()})
+    theirs = of["matrix-peers"]
+    digests = theirs[:1] + [digest for digest in of["matrix"] if digest not in theirs][:2]
+    own = [Choice("Chain", {}, 0, k, k, digest) for k, digest in enumerate(digests)]
     monkeypatch.setattr(set_index, "choices", lambda name: own if name == "standard" else ())
     parts = results.shards(tmp_path / "parts")
     sources = published.sources(published.by_name(parts))
-    assert sources == {"standard": parts}
+    assert sources == {
+        "standard": [part for part in parts if part.name != "matrix-peers"],
+        "standard-peers": parts,
+    }
+    parts = sources["standard"]
+    with results.alone([part.path for part in sources["standard-peers"]]) as joined:
+        beside = published.set_of("standard-peers", sources["standard-peers"], joined)
+    assert beside is not None  # of the set, what the part has
+    assert set(beside.every.solvers) == {"nsgs", "apgd", "nsn-ac", "psor", "admm"}
+    assert [row["problems"] for row in published.matrix_rows(beside, 1e-8)] == [1, 1]
     with results.alone([part.path for part in parts]) as joined:
         one = published.set_of("standard", parts, joined)
         none = published.set_of("hard", parts, joined)
@@ -170,7 +188,7 @@ def test_a_chosen_set_has_the_runs_that_chose_it(
     bench.run_campaign(bench.Campaign.of(short), tmp_path / "standard.sqlite")
     with bench.Store(tmp_path / "standard.sqlite") as opened:
         results.pack(opened, tmp_path / "parts", "standard", "fast")
-    parts = results.shards(tmp_path / "parts")
+    parts = published.sources(published.by_name(results.shards(tmp_path / "parts")))["standard"]
     with results.alone([part.path for part in parts]) as joined:
         one = published.set_of("standard", parts, joined)
     assert one is not None

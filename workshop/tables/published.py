@@ -63,9 +63,13 @@ BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
 # sets that were chosen from runs, and the parts that have these, beside parts of their own name
 LISTS: Final = {
     "standard": ("candidates", "matrix"),
+    "standard-peers": ("candidates", "matrix", "matrix-peers"),
     "hard": ("candidates-long",),
     "open": ("candidates-long",),
 }
+# what is no set by its name: the problems of a set that a part has
+PART_OF: Final = {"standard-peers": ("standard", "matrix-peers")}
+CHOSEN: Final = LISTS.keys() - PART_OF.keys()
 # how the problems of a set were taken, if that favours a solver
 TAKEN: Final = {
     "candidates-long": "The sets `standard`, `hard` and `open` [were chosen]"
@@ -73,7 +77,9 @@ TAKEN: Final = {
     "most half of the solvers of `candidates` solve the problems of `candidates-long`. `auto` and "
     "the solvers of `matrix` had no part in the choice. A problem was taken if some of the other "
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
-    "who solves what, and what nobody solves. They show less well by how much `auto` is better."
+    "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
+    "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
+    "programs have run so far, with their default options. All other solvers ran on them too.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {
@@ -150,14 +156,19 @@ def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[res
     used = {source for names in LISTS.values() for source in names}
     found |= {name: list(own) for name, own in groups.items() if name not in used | found.keys()}
     order = (*LISTS, *sorted(found.keys() - LISTS.keys()))
-    return {name: found[name] for name in order if found.get(name)}
+    there = {n for n in order if found.get(n) and (n not in PART_OF or PART_OF[n][1] in groups)}
+    return {name: found[name] for name in order if name in there}
 
 
 def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
     """The runs of a set, gathered; None if there is none."""
     # only their problems, so that a solver has no version in its name if others had another one
-    own = {choice.digest for choice in set_index.choices(name)} if name in LISTS else None
+    whole, part = PART_OF.get(name, (name, ""))
+    own = {choice.digest for choice in set_index.choices(whole)} if name in LISTS else None
     if own is not None:
+        if part:
+            theirs = [shard.path for shard in shards if shard.name == part]
+            own &= {row["hash"] for path in theirs for row in results.rows_of(path, ("hash",))}
         with Store(joined.path, create=False) as opened:
             own &= set(words_in(opened.table(), "hash").present())
         if not own:
@@ -371,7 +382,8 @@ def matrix_rows(one: Set, tol: float) -> list[Row]:
         if row["tol"] == tol and row["status"] != "unsuitable":
             key = row["hash"], row["solver"].partition(" (")[0]
             solved[key] = solved.get(key, True) and is_solved(row["status"])
-            family[row["hash"]] = set_index.kind_of(f"{one.name}/{row['family']}")
+            whole, _ = PART_OF.get(one.name, (one.name, ""))
+            family[row["hash"]] = set_index.kind_of(f"{whole}/{row['family']}")
     solvers = list(dict.fromkeys(solver for _, solver in solved))
     found = []
     for name in (*sorted(set(family.values())), ""):
@@ -384,19 +396,26 @@ def matrix_rows(one: Set, tol: float) -> list[Row]:
     return found
 
 
+def drawn(one: Set, costs: Costs) -> list[str]:
+    """The best solvers; those of other programs are half of them if the set is for these."""
+    best = [row["solver"] for row in profiles.summary(costs, weigh=WEIGH)[1:]]
+    if one.name in PART_OF:
+        theirs = [name for name in best if ":" in name][: DRAWN // 2]
+        best = [name for name in best if ":" not in name][: DRAWN - len(theirs)] + theirs
+    return best[:DRAWN]
+
+
 def pictures(one: Set) -> Iterator[str]:
     """Draw the profile of the best solvers at each tolerance, and the work-precision of a set."""
     for tol in one.tolerances:
         costs = one.costs.at(tol)
-        rows = profiles.summary(costs, weigh=WEIGH)[1 : DRAWN + 1]
-        part = costs.chosen([row["solver"] for row in rows])
+        part = costs.chosen(drawn(one, costs))
         name = f"published-{one.name}-{_results.power(tol)}"
         draw(name, profile_of(part))
         yield from image(name, f"{one.name} to {_results.power(tol)}: the best solvers")
     if len(one.tolerances) > 1:
         points = profiles.work_precision(one.rows, one.costs, weigh=WEIGH)
-        last = profiles.summary(one.costs.at(one.tolerances[-1]), weigh=WEIGH)[1 : DRAWN + 1]
-        chosen = {row["solver"] for row in last}
+        chosen = drawn(one, one.costs.at(one.tolerances[-1]))
         own = [point for point in points if point["solver"] in chosen]
         name = f"published-{one.name}-work"
         draw(name, lambda out: plots.work_precision(own, "cpu_s", out, ["png"]))
@@ -478,7 +497,7 @@ def kind_of(family: str) -> str:
     """The kind of the problems of a family: the set that it is of first."""
     known = scenes.families() | scenes.assemblies()
     # a list may call it otherwise
-    listed = (set_index.kind_of(f"{name}/{family}") for name in LISTS)
+    listed = (set_index.kind_of(f"{name}/{family}") for name in CHOSEN)
     family = next((own for own in listed if own in known), family)
     return known[family].collection if family in known else family
 

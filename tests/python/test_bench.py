@@ -782,19 +782,18 @@ def test_a_set_that_is_built_in_part_says_so(monkeypatch: pytest.MonkeyPatch) ->
     folders = library.Collection("tiny").folders
     there, built = set(folders[:3]), []
 
-    def build(plan: Any, progress: Any) -> library.Collection:
+    def build(plan: Any, folder: Path, progress: Any) -> None:
         for done in range(5):
             progress(plan.name, done, 5)
         built.append(plan.name)
-        return library.Collection(plan.name)
 
     monkeypatch.setattr(library, "is_there", lambda name, folder: name in there)
-    monkeypatch.setattr(generated, "_alone", build)
+    monkeypatch.setattr(generated, "_build", build)
     said: list[str] = []
     campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
     # those that were asked for and are not there, and no others
     assert built == folders[3:]
-    assert said[0].startswith(f"set tiny: 3 of {len(folders)} families are in ")
+    assert said[0].startswith(f"set tiny: 3 of {len(folders)} families are there; ")
     assert "fclib collection build tiny --no-references --out " in said[0]
     # a word for each family at once, and not one for each problem
     assert said[1:-1] == [
@@ -835,6 +834,9 @@ def test_a_sample_of_a_family_is_built_alone(
     assert len(files) == len(fclib.collections.plan_of("simulators/PyBulletBoxes").numbers())
     assert [fclib.read_solution(file) for file in files] == [None] * len(files)
     assert not (tmp_path / "collection").exists()
+    said: list[str] = []
+    again = campaign(problems=["set:simulators/PyBulletBoxes"], **settings).plan(tell=said.append)
+    assert (said, len(again)) == ([], len(plan))
 
 
 def test_files_of_a_set_that_is_not_built_name_the_command(

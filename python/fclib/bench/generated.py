@@ -25,7 +25,6 @@ from fclib.bench.problems import SUFFIXES, sample
 
 if TYPE_CHECKING:
     from fclib.collections.build import Progress
-    from fclib.collections.library import Collection
     from fclib.collections.plan import Plan
 
 PATIENCE = 10.0  # [s] between two messages on the progress of a build
@@ -171,26 +170,29 @@ def of_set(
 
     try:
         found = library.Collection(name)
-        absent = [own for own in found.folders if not library.is_there(own, found.folder)]
-        if absent:
-            there = len(found.folders) - len(absent)
+        fetched = bool(os.environ.get(library.SOURCE))
+        made = {  # the families that no folder of the collection has
+            own: _without_references(set_index.plan_of(own))
+            for own in found.folders
+            if not fetched and not library.is_there(own, found.folder)
+        }
+        missing = [own for own, (_, folder) in made.items() if not library.is_there(own, folder)]
+        if missing:
             tell(
-                f"set {name}: {there} of {len(found.folders)} families are in {found.folder}; the"
-                " others are made now, once, without reference solutions:"
-                f" {', '.join(own.split('/')[-1] for own in absent)}. On several cores:"
+                f"set {name}: {len(found.folders) - len(missing)} of {len(found.folders)} families"
+                " are there; the others are made now, once, without reference solutions:"
+                f" {', '.join(own.split('/')[-1] for own in missing)}. On several cores:"
                 f" fclib collection build {name} --no-references --out {found.folder}"
             )
-        parts = []
-        for own in found.folders:
-            if own in absent and not os.environ.get(library.SOURCE):
-                which = f"family {absent.index(own) + 1} of {len(absent)}"
-                parts.append(_alone(set_index.plan_of(own), now_and_then(which, tell)))
-                continue
-            library.ensure(own, found.folder)
-            parts.append(library.Collection(own, found.folder))
-        if absent:
+        for k, own in enumerate(missing):
+            _build(*made[own], now_and_then(f"family {k + 1} of {len(missing)}", tell))
+        if missing:
             tell(f"set {name}: built")
-        return [part.path(k, form).resolve() for part in parts for k in range(len(part))]
+        paths = []
+        for own in found.folders:
+            part = library.Collection(own, made[own][1] if own in made else found.folder)
+            paths += [part.path(k, form).resolve() for k in range(len(part))]
+        return paths
     except (KeyError, OSError) as error:
         word = error.args[0] if isinstance(error, KeyError) else error
         raise _core.Error(f"set {name}: {word}") from None
@@ -228,20 +230,23 @@ def sampled(
     numbers = plan.numbers().tolist()
     if plan.trajectory is None or count >= len(numbers):
         return []
-    part = _alone(plan.only(sample(numbers, count)), now_and_then(f"a sample of {count}", tell))
+    plan, folder = _without_references(plan.only(sample(numbers, count)))
+    _build(plan, folder, now_and_then(f"a sample of {count}", tell))
+    part = library.Collection(plan.name, folder)
     return [part.path(k, form).resolve() for k in range(len(part))]
 
 
-def _alone(plan: Plan, progress: Progress) -> Collection:
-    """The problems of a plan in the cache, without references: these take longer than runs do."""
-    from fclib.collections import library
-    from fclib.collections.build import build
-
+def _without_references(plan: Plan) -> tuple[Plan, Path]:
+    """The plan without references, which take longer than runs do, and its folder in the cache."""
     plan = dataclasses.replace(plan, references=False)
     digest = hashlib.sha256(plan.fingerprint().encode()).hexdigest()[:16]
-    folder = cache_folder() / "samples" / digest
+    return plan, cache_folder() / "samples" / digest
+
+
+def _build(plan: Plan, folder: Path, progress: Progress) -> None:
+    from fclib.collections.build import build
+
     build([plan], folder, pictures=False, progress=progress)
-    return library.Collection(plan.name, folder)
 
 
 def now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:

@@ -15,7 +15,7 @@ from fclib import _core
 from fclib._solve import Problem
 from fclib._words import counted
 from fclib.collections import archives, catalog, published, set_index
-from fclib.collections.build import Progress, build
+from fclib.collections.build import build
 
 FOLDER = "FCLIB_COLLECTION"  # environment variable: the folder, instead of the user's cache
 FORMS = ("global", "local")
@@ -33,13 +33,12 @@ def is_there(name: str, folder: Path) -> bool:
     return (folder / name / catalog.FILE).is_file()
 
 
-def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
+def ensure(name: str, folder: Path) -> None:
     """Fetch SET/FAMILY from FCLIB_COLLECTION_URL, or build it, if it is missing; minutes at most.
 
     Args:
         name: SET/FAMILY.
         folder: of the collection.
-        progress: called with the progress of a build, as in `build`.
 
     Raises:
         VersionError: the folder has another version of it.
@@ -60,7 +59,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
     if source:
         archives.get([name], source, folder)
     else:
-        build([set_index.plan_of(name)], folder, pictures=False, progress=progress)
+        build([set_index.plan_of(name)], folder, pictures=False)
 
 
 def folders_in(folder: Path, name: str) -> list[str]:

@@ -27,7 +27,7 @@ gauss-seidel                    : gauss_seidel                                  
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
 # from near what the sweeps have; if it slows down, the proximal point is near enough
-interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60
+interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60 polish=1e-4
 # dense heaps on which its path ends, or no memory for factors (ChainMail/0599 to 1e-4)
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb

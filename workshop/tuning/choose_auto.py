@@ -309,7 +309,7 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
             for value in values
         ]
-    for value in (1e-6, 1e-4, 1e-3):
+    for value in (1e-6, 1e-5, 1e-3):
         change = with_rules(at, polish=f"{value:g}")
         result.append(Change(f"{first}: polish={value:g}", first, change))
     sweeps = place(lines, "gauss-seidel")

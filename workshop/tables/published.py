@@ -79,7 +79,8 @@ TAKEN: Final = {
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
-    "programs have run so far, with their default options. All other solvers ran on them too.",
+    "programs have run so far, with their default options, beside the runs of `candidates` and "
+    "`matrix` on these.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {

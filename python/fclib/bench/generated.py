@@ -223,7 +223,7 @@ def sampled(
     try:
         found = library.Collection(name)
     except KeyError:
-        return []  # problems.of_set says what there is
+        return []  # of_set says what there is
     if len(found.folders) != 1 or library.is_there(found.folders[0], found.folder):
         return []
     plan = set_index.plan_of(found.folders[0])

@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 import json
 import random
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from helpers_bench import facts_of
 LABELS = ["auto", "nsgs", "under_score", "rare"]
 NAMES = {"auto": "auto", "under_score": "nsn-ac"}
 TOLERANCES = (1e-4, 1e-8)
+# of the collection, two problems of the same data
+ORIGINAL, COPY = "small/BoxesStack/0008", "small/BoxesStack/0009"
 
 
 def skip_without_libraries() -> None:
@@ -34,14 +37,31 @@ def skip_without_libraries() -> None:
 
 
 def make_collection(folder: Path, analyze: bool = False) -> Path:
-    """A stack of three cubes that lands: a dozen problems in both forms."""
+    """A stack of three cubes that lands: a dozen problems in both forms, one with the data again."""
     from fclib import collections, scenes
     from fclib.collections.plan import Plan
 
     scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
     plan = Plan(scene=scene, collection="small", problems=12, analyze=analyze)
     collections.build([plan], folder, pictures=False)
+    _repeat(folder, plan.name)
     return folder
+
+
+def _repeat(out: Path, family: str) -> None:
+    """Gives problem COPY the data of ORIGINAL, as a body at rest may in the next step."""
+    from fclib.collections import catalog
+
+    part = out / family / catalog.FILE
+    table = catalog.read_catalog(part)
+    rows = {row["id"]: row for row in table.to_pylist()}
+    original, copy = rows[ORIGINAL], rows[COPY]
+    for file in ("global_file", "local_file"):
+        shutil.copy(out / original[file], out / copy[file])
+    own = {name: copy[name] for name in ("id", "number", "step", "time", "global_file", "local_file")}
+    rows[COPY] = original | own
+    catalog.write_catalog(part, rows.values(), table.schema.metadata)
+    catalog.gather(out)
 
 
 def make_store(
@@ -67,12 +87,12 @@ def make_store(
 
 
 def make_report(folder: Path) -> None:
-    """A collection, a store and their site: four pictures to turn, and a name to be escaped."""
+    """A collection, a store and their site: pictures to turn of all that ran, and a name to be escaped."""
     from fclib.report import Campaigns, build_site
 
     collection = make_collection(folder / "collection")
     with Campaigns([make_store(folder / "runs.sqlite", collection)]) as campaigns:
-        build_site(campaigns, folder / "a site #1", collection, views=5)
+        build_site(campaigns, folder / "a site #1", collection, views=6)
 
 
 def add_runs(

@@ -54,7 +54,8 @@ constexpr double exact_residual = 0.01;           // [tolerance] What is left is
 constexpr double own_tolerance = 1e-2;
 
 // polishing on the way
-constexpr double polish_below = 1e-5;          // a polish is tried below this error
+constexpr double polish_below = 1e-5;       // a polish is tried below this error
+constexpr double sooner_on_two_cones = 10;  // ... so much sooner where paths lose digits (rolling)
 constexpr double polish_below_on_path = 1e-4;  // ... on the path of the homotopy
 constexpr double next_polish = 30;             // it is tried again if the error is so much less
 constexpr double next_polish_of_rounds = 10;   // ... if one step of the path costs much
@@ -477,7 +478,8 @@ void Island<Cone>::run(const InteriorPointStage& stage) {
   InteriorPointRules rules = stage;
   if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
   Path method(problem_, system());
-  ProximalPolish polish(*this, stage.polish, next_polish);
+  constexpr double sooner = std::is_same_v<Cone, Coulomb<D>> ? 1 : sooner_on_two_cones;
+  ProximalPolish polish(*this, sooner * stage.polish, next_polish);
   // a loose tolerance needs no polish: the path makes the last steps itself
   const double near = tolerance_ > own_accuracy ? next_polish * tolerance_ : 0;
   method.solve(rules, start_of(stage.from), [&](double error, const Vector& r) {

@@ -272,7 +272,9 @@ struct InteriorPointStage : InteriorPointRules {
         smoothing_option(),
         step_cap_option(),
         delta_option(),
-        option("polish", &O::polish, "1", {0}, "Iterates of a smaller error are polished.")};
+        option("polish", &O::polish, "1", {0},
+               "Iterates of a smaller error are polished; those of rolling contacts at ten times "
+               "the error.")};
   }
 };
 

@@ -34,6 +34,8 @@ namespace interior {
 // when it ends
 constexpr double last_tau = 1e-15;
 constexpr double shortest_step = 1e-6;
+// Until then no direction is refined: the next residual has what rounding leaves of it.
+constexpr double refined_tau = 1e-7;
 // the regularisation
 constexpr double delta_over_tau = 1e4;  // delta is at most so many times tau
 constexpr double least_delta = 1e-8;

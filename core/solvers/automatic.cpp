@@ -27,7 +27,7 @@ gauss-seidel                    : gauss_seidel                                  
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
 # from near what the sweeps have; if it slows down, the proximal point is near enough
-interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60 polish=1e-4
+interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60
 # dense heaps on which its path ends, or no memory for factors (ChainMail/0599 to 1e-4)
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
@@ -46,7 +46,7 @@ no solution?                    : no_solution                                   
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 # (Chute4000/0074; Chute1000/0116 to 1e-4)
-semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
+semismooth newton               : semismooth_newton   from=nothing law=coulomb function=fischer_burmeister most_flops=100 limit=200
 # light bodies beside heavy ones, angles beside lengths: a hand whose fingers stand at their limits
 # (talos_full_v2 of example-robot-data, steps 0, 4, 5, 10, 16)
 own units                       : own_units           range=1e6

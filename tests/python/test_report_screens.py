@@ -19,7 +19,7 @@ from fclib.bench.profiles import caption as caption_of
 from fclib.collections.figures import bins_of, is_whole
 from fclib.report import Campaigns, build_site
 from helpers_browser import DESK, PHONE, UNFOLD, Opener, check_accessible, colours, press_all, turn
-from helpers_report import made_facts, read_data, skip_without_libraries
+from helpers_report import COPY, ORIGINAL, made_facts, read_data, skip_without_libraries
 
 # what they give is of one kind here
 read: Any = fclib.read
@@ -31,7 +31,6 @@ pytestmark = pytest.mark.slow
 
 SIZES = {"desk": DESK, "phone": PHONE}
 PROBLEM = "#/problem/small/BoxesStack/0008"
-COPY, ORIGINAL = "small/BoxesStack/0009", "small/BoxesStack/0008"
 # of each kind of page what stands on its first screen, whole: on both sizes, and on a desk alone
 WHOLE: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "overview": ("#/overview", ("h1", ".answer"), (".first .plot",)),

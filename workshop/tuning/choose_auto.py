@@ -309,7 +309,7 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
             for value in values
         ]
-    for value in (1e-6, 1e-5, 1e-3):
+    for value in (1e-6, 1e-4, 1e-3):
         change = with_rules(at, polish=f"{value:g}")
         result.append(Change(f"{first}: polish={value:g}", first, change))
     sweeps = place(lines, "gauss-seidel")
@@ -370,6 +370,10 @@ def changes(lines: list[str]) -> list[Change]:
         change = moved(place(lines, name), after)
         result.append(Change(f"{name}: after held bodies", name, change))
     result.append(Change(f"{' and '.join(late)}: after held bodies", late[0], after_held(late)))
+    newton = place(lines, "semismooth newton")
+    for function in ("natural_map", "alart_curnier"):
+        change = with_rules(newton, function=function)
+        result.append(Change(f"semismooth newton: function={function}", names[newton], change))
     for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):
         for value in (200, 400):
             change = moved(middle, place(lines, earlier), limit=value)

@@ -13,6 +13,7 @@ other pages have larger numbers):
     linked      some without a solution, which an open contact links to one island
     no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
     jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
+    paths       the FILEs of the families to choose on, by the interior point alone
     crowded     the FILEs of the families to choose on that come to this stage: most bodies move
     batches     boxes of 4 to 64 contacts, in batches, cold and warm, to four tolerances
     alone       boxes on a corner, mechanisms and spheres, one contact each, likewise
@@ -147,6 +148,7 @@ CONSTANTS = [
             ("near_end", "sweep_rule"),
         )
     ),
+    varied("refined_tau", "paths", 0, 1e-9, 1e-5, 1e-3, 1e9, source="methods/interior_path.hpp"),
     varied("own_tolerance", "random", 1, 1e-3, 1e-4, source="chain/stages.cpp"),
     varied("part_of_sweep", "batches", 0.15, 0.6, 1, source="embed/lanes.cpp"),
     varied("most_steps_alone", "alone", 2, 16, 64, 128, source="embed/alone_steps.hpp"),
@@ -178,7 +180,8 @@ RULES = [
 LATE: dict[str, set[str]] = defaultdict(
     set, random={"pivoting", "random starts"}, jammed={HELD}, crowded={HELD}
 )
-LIMITED = {"no memory", "jammed", "crowded"}
+LIMITED = {"no memory", "paths", "jammed", "crowded"}
+OF_FILES = {"no memory", "paths", "crowded"}
 PACKINGS = [  # contacts, push, seed
     f"{contacts} {push:g} {seed}"
     for contacts in (800,)
@@ -242,7 +245,7 @@ def holds(problem: Any, solution: fclib.Solution) -> bool:
 
 def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[str, Any, Any]]:
     """Names, problems and guesses; `given` are files, or numbers that were picked."""
-    if kind in {"no memory", "crowded"}:
+    if kind in OF_FILES:
         for file in given:
             yield file, fclib.read(Path(file)), None
         return
@@ -304,7 +307,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
             end = before + seconds
             result = fclib.solve(
                 problem,
-                "auto",
+                "nsip" if kind == "paths" else "auto",
                 tol,
                 guess=guess,
                 callback=lambda *_, end=end: time.process_time() < end,
@@ -417,13 +420,13 @@ def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
         found: list[str] = measured(ROOT / "python", {**job, "kind": kind, "given": given})["late"]
         return found
 
-    given: dict[str, list[str]] = {"no memory": files}
+    given: dict[str, list[str]] = {"no memory": files, "paths": files}
     for constant in CONSTANTS:
         kind = constant.problems
         held = HELD if constant.source == HELD_SOURCE else ""
         if not wanted(f"{constant.name} {kind} {held}"):
             continue
-        if kind in {"no memory", "crowded"} and not files:
+        if kind in OF_FILES and not files:
             continue
         if LATE[kind] and kind not in given:
             given[kind] = late(kind)

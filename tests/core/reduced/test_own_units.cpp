@@ -74,8 +74,8 @@ void expect_same_way(const Rules& rules) {
   }
   ASSERT_EQ(ways[0].size(), 8);
   ASSERT_EQ(ways[1].size(), 8);
-  // each iterate amplifies the rounding of the one before
-  constexpr double bound = testing::fused_kernels ? 1e-7 : 1e-9;
+  // no direction is refined, and each iterate amplifies the rounding of the one before
+  constexpr double bound = testing::fused_kernels ? 1e-7 : 1e-8;
   for (std::size_t k = 0; k < 8; ++k) {
     EXPECT_LT((ways[1][k] - ways[0][k]).norm(), bound * ways[0][k].norm()) << k;
   }

@@ -45,7 +45,7 @@ no solution?                    : no_solution                                   
 # cheap beside what follows (a pile of boxes that overlap: drakehard-sap-0140)
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
-# (Chute4000/0074; Chute1000/0116 to 1e-4)
+# (PegInHole/0033)
 semismooth newton               : semismooth_newton   from=nothing law=coulomb function=fischer_burmeister most_flops=100 limit=200
 # light bodies beside heavy ones, angles beside lengths: a hand whose fingers stand at their limits
 # (talos_full_v2 of example-robot-data, steps 0, 4, 5, 10, 16)

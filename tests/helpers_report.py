@@ -37,7 +37,7 @@ def skip_without_libraries() -> None:
 
 
 def make_collection(folder: Path, analyze: bool = False) -> Path:
-    """A stack of three cubes that lands: a dozen problems in both forms, one with the data again."""
+    """A stack of three cubes that lands: a dozen problems in both forms, one of them a copy."""
     from fclib import collections, scenes
     from fclib.collections.plan import Plan
 
@@ -58,8 +58,8 @@ def _repeat(out: Path, family: str) -> None:
     original, copy = rows[ORIGINAL], rows[COPY]
     for file in ("global_file", "local_file"):
         shutil.copy(out / original[file], out / copy[file])
-    own = {name: copy[name] for name in ("id", "number", "step", "time", "global_file", "local_file")}
-    rows[COPY] = original | own
+    kept = ("id", "number", "step", "time", "global_file", "local_file")
+    rows[COPY] = original | {name: copy[name] for name in kept}
     catalog.write_catalog(part, rows.values(), table.schema.metadata)
     catalog.gather(out)
 
@@ -87,7 +87,7 @@ def make_store(
 
 
 def make_report(folder: Path) -> None:
-    """A collection, a store and their site: pictures to turn of all that ran, and a name to be escaped."""
+    """A collection, a store and their site: pictures of all that ran, and a name to be escaped."""
     from fclib.report import Campaigns, build_site
 
     collection = make_collection(folder / "collection")

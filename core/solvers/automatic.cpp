@@ -56,7 +56,8 @@ held bodies                     : held_bodies         at_least=100              
 proximal point                  : proximal_point      from=best                        limit=200
 # slow, but cheaper than the path that follows (101015)
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
-homotopy                        : homotopy                                             smoothing=0.3 limit=1500
+# to its end, however often it folds: what follows is for few contacts, or slower (LowWall/0032)
+homotopy                        : homotopy                                             smoothing=0.3 limit=20000
 # contacts that wedge each other: few enough for dense tableaux (101098; then 100791, 101340)
 pivoting                        : pivoting            at_most=20                       edges=4 tries=60
 pivoting                        : pivoting            at_most=8                        edges=16 tries=40

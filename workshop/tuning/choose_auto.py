@@ -370,6 +370,9 @@ def changes(lines: list[str]) -> list[Change]:
         change = moved(place(lines, name), after)
         result.append(Change(f"{name}: after held bodies", name, change))
     result.append(Change(f"{' and '.join(late)}: after held bodies", late[0], after_held(late)))
+    path = place(lines, "homotopy")
+    for value in (1500, 5000):
+        result.append(Change(f"homotopy: limit={value}", "homotopy", with_rules(path, limit=value)))
     newton = place(lines, "semismooth newton")
     for function in ("natural_map", "alart_curnier"):
         change = with_rules(newton, function=function)

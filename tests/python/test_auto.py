@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import fclib
 from ball_judge import judge
-from fclib import analysis
+from fclib import analysis, collections
 from fclib.scenes.packing import Packing
 from helpers import (
     auto_chain,
@@ -466,6 +466,18 @@ def test_near_a_solution_the_proximal_point_goes_on() -> None:
     solved = [stage.name for stage in result.stages if stage.solved]
     assert {"proximal point, near", "proximal point, longer"} & set(solved)
     assert "homotopy" not in stage_names(result)
+
+
+@pytest.mark.long
+def test_the_homotopy_goes_to_the_end_of_its_path() -> None:
+    """A wall of `standard` that no other stage solves: its path takes thousands of points."""
+    path = collections.plan_of("standard/LowWall").trajectory
+    if path is None:
+        pytest.skip("its states are not stored")
+    problem = collections.read_trajectory(path).problem(0).problem
+    result = converged(problem, time_limit=200.0)
+    assert_honest(problem, result, 1e-8)
+    assert result.stages[-1].name == "homotopy"
 
 
 def test_each_word_of_a_chain_is_told_and_taken() -> None:

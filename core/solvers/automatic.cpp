@@ -44,7 +44,7 @@ gauss-seidel                    : sweep_on            law=coulomb
 no solution?                    : no_solution                                          limit=60
 # cheap beside what follows (a pile of boxes that overlap: drakehard-sap-0140)
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
-# where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
+# if it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 # (PegInHole/0033)
 semismooth newton               : semismooth_newton   from=nothing law=coulomb function=fischer_burmeister most_flops=100 limit=200
 # light bodies beside heavy ones, angles beside lengths: a hand whose fingers stand at their limits
@@ -56,7 +56,7 @@ held bodies                     : held_bodies         at_least=100              
 proximal point                  : proximal_point      from=best                        limit=200
 # slow, but cheaper than the path that follows (101015)
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
-# to its end, however often it folds: what follows is for few contacts, or slower (LowWall/0032)
+# to its end, however often it folds (LowWall/0032)
 homotopy                        : homotopy                                             smoothing=0.3 limit=20000
 # contacts that wedge each other: few enough for dense tableaux (101098; then 100791, 101340)
 pivoting                        : pivoting            at_most=20                       edges=4 tries=60

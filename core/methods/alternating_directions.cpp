@@ -56,7 +56,7 @@ void AlternatingDirections<Cone>::x_update(const Vector& shift) {
     x_.template segment<D>(D * a) =
         zh_.template segment<D>(D * a) - wh_.template segment<D>(D * a) - h / (rho_ * weight_[a]);
   }
-  system_.solve_plain(x_);
+  system_.solve(x_, false);
 }
 
 template <class Cone>

@@ -242,11 +242,7 @@ bool ProductInteriorPoint<Cone>::direction(double delta) {
         (contact.A * target - contact.D0 * residual_vector_.template segment<D>(D * a));
   }
   dr_ = units_.divided(dr_);
-  if (tau_ < interior::refined_tau) {
-    system_.solve(dr_);
-  } else {
-    system_.solve_plain(dr_);
-  }
+  system_.solve(dr_, tau_ < interior::refined_tau);
   dr_ = units_.multiplied(dr_);
   if (!dr_.allFinite()) return false;
   units_.product(dr_, residual_vector_, rhs_, system_.workers());  // W dr + R

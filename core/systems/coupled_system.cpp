@@ -156,7 +156,11 @@ void CoupledSystem::solve_once(Vector& x) {
   lu_.solve(x);
 }
 
-void CoupledSystem::solve(Vector& x) {
+void CoupledSystem::solve(Vector& x, bool refined) {
+  if (!refined) {
+    solve_once(x);
+    return;
+  }
   rhs_ = x;
   solve_once(x);
   // one step of refinement: r = h - B x - D W x

@@ -43,10 +43,8 @@ class CoupledSystem {
   /// Returns false if the blocks are not finite, or if the time is over.
   bool factorise();
 
-  /// x <- (B + D W)^-1 x.
-  void solve(Vector& x);
-  /// The same without refinement, for iterations that correct it themselves.
-  void solve_plain(Vector& x) { solve_once(x); }
+  /// x <- (B + D W)^-1 x. An iteration that corrects itself needs no refinement.
+  void solve(Vector& x, bool refined = true);
 
   /// The sign of det(B + D W), 1 or -1, after factorise().
   [[nodiscard]] int determinant_sign() const { return lu_.determinant_sign(); }

@@ -898,11 +898,11 @@ def compare(problems: list[Problem], arguments: argparse.Namespace) -> None:
         _results.store(
             arguments.results,
             rows,
-            title="auto beside an older version, on problems it was not chosen on",
+            title=f"auto beside another version ({arguments.other}), on problems it was not chosen on",
             note=f"{len(judging)} problems of {families} families of the judging half, at most "
-            f"{arguments.problems} of a family, evenly spread. {arguments.other} is the older "
-            f"version. A failure counts as {longest:g} s; the mean is geometric, shifted by 1 ms. "
-            f"What {limits[-2:][0]:g} s do not solve is tried once more, for {longest:g} s.",
+            f"{arguments.problems} of a family, evenly spread. A failure counts as {longest:g} s; "
+            "the mean is geometric, shifted by 1 ms. What "
+            f"{limits[-2:][0]:g} s do not solve is tried once more, for {longest:g} s.",
         )
         _results.store(
             f"{arguments.results}-worst",

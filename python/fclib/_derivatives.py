@@ -209,12 +209,15 @@ def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
 
 
 def _beyond(group: _laws.Group, z: Array) -> Array:
-    """How far z_g is outside its limit at z_N (nc): negative inside."""
+    """How far z_g is outside its limit at z_N (nc): negative inside.
+
+    A half-axis of 0 limits nothing else: the contact moves freely along it.
+    """
     part = z[:, group.part]
     if group.uniform:
         return np.asarray(np.linalg.norm(part, axis=1) - group.coefficient * z[:, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(part == 0, 0.0, part / group.axes)
+        shares = np.where((part == 0) | (group.axes == 0), 0.0, part / group.axes)
     largest = group.axes.max(axis=1)
     far = np.linalg.norm(part, axis=1)  # if nothing may slide or spin
     some = largest > 0
@@ -308,13 +311,16 @@ class _Point:
             bounds = names[group.name] if size == 3 else names[group.name] * size
             beyond = _beyond(group, z)
             self.degenerate |= ~opened & (np.abs(beyond) <= border)
-            slides = (beyond > 0) | ~group.axes.all(axis=1)
+            held = group.axes > 0
+            slides = (beyond > 0) | ~held.any(axis=1)
             for a in np.flatnonzero(~opened).tolist():
                 tangent = slice(d * a + group.part.start, d * a + group.part.stop)
-                if not slides[a]:
-                    self.by_u[tangent, tangent] = rho[a] * np.eye(size)
-                    continue
                 e, moved = group.axes[a], u[a, group.part]
+                if not slides[a]:
+                    self.by_u[tangent, tangent] = rho[a] * np.diag(held[a].astype(float))
+                    self.by_r[tangent, tangent] = np.diag((~held[a]).astype(float))
+                    self._free(a, group, bounds, rho[a], border)
+                    continue
                 self.by_r[tangent, tangent] = np.eye(size)
                 if group.uniform:
                     mu, speed = e[0], np.linalg.norm(moved)
@@ -338,6 +344,32 @@ class _Point:
                 by_axes -= np.outer(t, e * away * away / length**2)
                 for axis, name in enumerate(bounds):
                     self.by_friction[name][a, group.part] -= r[a, 0] * by_axes[:, axis]
+
+    def _free(
+        self, a: int, group: _laws.Group, bounds: tuple[str, ...], rho: float, border: float
+    ) -> None:
+        """What a coefficient does that is 0, if the rest of the ellipsoid sticks.
+
+        With e for 0 and s = ||r_h / e_h|| / r_N for the rest, which holds, r = -e r_N sqrt(1 - s^2)
+        u / ||u|| along the free axes, to the first order of e; and the rest creeps.
+        """
+        d = self.d
+        rows = d * a + group.part.start + np.arange(group.part.stop - group.part.start)
+        e, u, r = group.axes[a], self.u[rows], self.r[rows]
+        free = e == 0
+        if not free.any():
+            return
+        normal, speed = self.r[d * a], np.linalg.norm(u[free])
+        share = np.linalg.norm(r[~free] / e[~free]) / normal if normal > 0 else 1.0
+        if rho * speed <= border or share >= 1:
+            self.degenerate[a] = True
+            return
+        rest = np.sqrt(1 - share**2)
+        by_coefficient = np.zeros(len(e))
+        by_coefficient[free] = -normal * rest * u[free] / speed
+        by_coefficient[~free] = -rho * r[~free] / e[~free] ** 2 * speed / (normal * rest)
+        name = bounds[int(np.flatnonzero(free)[0])]
+        self.by_friction[name][a, group.part] = by_coefficient
 
     def _solve(self, transposed: bool, right: Array) -> tuple[Array, bool]:
         """Solve by singular values, after rows and columns are scaled to the same size."""

@@ -251,3 +251,40 @@ def test_matrices_without_a_scale() -> None:
     )
     with pytest.raises(fclib.UnsuitableError, match="M is not positive definite"):
         fclib.jvp(massless, np.zeros(3), f=np.ones(3))
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "q"),
+    [
+        ((0.0, 0.5), [-1.0, 0.5, 0.0, 0.2]),  # it slides freely, and the spin sticks
+        ((0.5, 0.0), [-1.0, 0.2, 0.1, 0.4]),  # it spins freely, and sticks
+        ((0.0, 0.5), [-1.0, 0.5, 0.3, 0.9]),
+        ((0.5, 0.0), [-1.0, 0.9, 0.3, 0.2]),
+    ],
+)
+def test_an_ellipsoid_with_one_coefficient_of_zero(
+    coefficients: tuple[float, float], q: list[float]
+) -> None:
+    """What has no friction moves freely; the rest sticks or slides as if it were alone."""
+    A = np.random.default_rng(1).standard_normal((4, 4))
+    mu, mu_s = coefficients
+    problem = fclib.LocalSpinProblem(
+        spacedim=4, W=np.eye(4) + 0.1 * A @ A.T, q=q, mu=[mu], mu_s=[mu_s], coupled=True
+    )
+
+    def solved(**changes: Any) -> Any:
+        return fclib.solve(problem.replace(**changes), tol=1e-15).solution
+
+    at = solved()
+    for k in range(4):
+        step = 1e-6 * np.eye(4)[k]
+        difference = solved(q=problem.q + step).r - solved(q=problem.q - step).r
+        tangent = fclib.jvp(problem, at, q=np.eye(4)[k])
+        np.testing.assert_allclose(tangent.r, difference / 2e-6, atol=1e-7)
+        assert not tangent.degenerate.any()
+    # the coefficient of zero can only grow
+    name = "mu" if mu == 0 else "mu_s"
+    grown = solved(**{name: [1e-7]})
+    tangent = fclib.jvp(problem, at, **{name: [1.0]})
+    np.testing.assert_allclose(tangent.r, (grown.r - at.r) / 1e-7, atol=1e-6)
+    np.testing.assert_allclose(tangent.u, (grown.u - at.u) / 1e-7, atol=1e-6)

@@ -30,6 +30,11 @@ RawMatrixView view_of(const fclib_matrix& c, const Place& where) {
   std::size_t entries = size_of(c.nzmax, where / "nzmax");
   if (c.nz >= 0) {
     a.storage = Storage::triplet;
+    // programs for libfclib 3.1 may leave nzmax at 0
+    if (c.nzmax > 0 && c.nz > c.nzmax) {
+      fail(where / "nz",
+           std::to_string(c.nz) + " entries, more than nzmax, " + std::to_string(c.nzmax));
+    }
     entries = static_cast<std::size_t>(c.nz);
     a.p = numbers(c.p, entries, where / "p");
   } else if (c.nz == nz_csc || c.nz == nz_csr) {

@@ -1,5 +1,6 @@
 #include "solve/plugin.hpp"
 
+#include <cfenv>
 #include <cmath>
 #include <cstddef>
 #include <exception>
@@ -43,9 +44,54 @@ Error plugin_error(std::string_view name, const std::string& message) {
 
 std::string text_of(const char* text) { return text != nullptr ? text : ""; }
 
-/// What a function of a plugin returns. If it throws, refusal(word) is thrown instead.
+/// Whether a text is UTF-8 (RFC 3629, section 4).
+bool is_utf8(std::string_view text) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  for (std::size_t k = 0; k < text.size();) {
+    const unsigned lead = byte(k);
+    const std::size_t length = lead < 0x80 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+    if (length > 1 && (lead < 0xc2 || lead > 0xf4)) return false;
+    if (length > text.size() - k) return false;
+    for (std::size_t j = 1; j < length; ++j) {
+      // the second byte excludes what is too long, surrogates, and what is beyond Unicode
+      const unsigned least = j > 1 ? 0x80 : lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
+      const unsigned most = j > 1 ? 0xbf : lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
+      if (byte(k + j) < least || byte(k + j) > most) return false;
+    }
+    k += length;
+  }
+  return true;
+}
+
+/// A text that a plugin tells of itself. Throws Error (option) if it is not UTF-8.
+std::string told_text(std::string_view plugin, const char* what, const char* text) {
+  std::string told = text_of(text);
+  if (!is_utf8(told)) bad_plugin(plugin, "its " + std::string(what) + " is not UTF-8");
+  return told;
+}
+
+/// The modes of floating-point arithmetic (rounding, precision, traps, small numbers as zero) are
+/// put back at the end of the scope. A plugin may change them, if only because it was compiled with
+/// -Ofast, and its iterates are judged.
+class ArithmeticScope {
+ public:
+  /// `inside`: the modes in the scope, if they are others than those before it.
+  explicit ArithmeticScope(const std::fenv_t* inside = nullptr) {
+    std::fegetenv(&before_);
+    if (inside != nullptr) std::fesetenv(inside);
+  }
+  ~ArithmeticScope() { std::fesetenv(&before_); }
+  ArithmeticScope(const ArithmeticScope&) = delete;
+  ArithmeticScope& operator=(const ArithmeticScope&) = delete;
+
+ private:
+  std::fenv_t before_ = {};
+};
+
+/// What code of a plugin returns. If it throws, refusal(word) is thrown instead.
 template <class Called, class Refusal>
 auto unthrown(Called&& called, Refusal&& refusal) {
+  const ArithmeticScope usual;
   std::string word = "something that is no exception";
   try {
     return called();
@@ -66,8 +112,10 @@ struct Call {
   std::int64_t iterations = -1;  // the first report is the starting point
   std::optional<Status> reason = {};
   std::exception_ptr thrown = {};
+  std::fenv_t usual = {};  // the modes in which an iterate is judged
 
   bool stop(const double* iterate) {
+    const ArithmeticScope judging(&usual);
     try {
       if (iterate == nullptr) throw SolverError("stop() was given no iterate", "a plugin");
       ++iterations;
@@ -114,6 +162,7 @@ Outcome run(Function function, const std::string& name, const std::vector<Option
   const OptionValues options = parse_options(infos, values);
   const Matrix W = by_rows(problem.W);
   Call call{problem, options, infos, Monitor(settings)};
+  std::fegetenv(&call.usual);
   fclib_plugin_problem given{};
   given.size = sizeof given;
   given.spacedim = problem.d();
@@ -150,11 +199,12 @@ Outcome run(Function function, const std::string& name, const std::vector<Option
 
 /// An option as the plugin describes it. Throws Error (option) if it contradicts itself.
 OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
-  OptionInfo info{.name = told.name,
-                  .type = text_of(told.type),
-                  .default_value = text_of(told.value),
-                  .unit = text_of(told.unit),
-                  .doc = text_of(told.doc),
+  const auto text = [&](const char* given) { return told_text(plugin, "option", given); };
+  OptionInfo info{.name = text(told.name),
+                  .type = text(told.type),
+                  .default_value = text(told.value),
+                  .unit = text(told.unit),
+                  .doc = text(told.doc),
                   .choices = {}};
   if (told.lowest != 0 || told.highest != 0) {
     info.lowest = told.lowest;
@@ -162,7 +212,7 @@ OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
   }
   for (const char* const* choice = told.choices; choice != nullptr && *choice != nullptr;
        ++choice) {
-    info.choices.emplace_back(*choice);
+    info.choices.push_back(text(*choice));
   }
   constexpr std::string_view types[] = {"bool", "int", "float", "choice", "text"};
   if (std::find(std::begin(types), std::end(types), info.type) == std::end(types)) {
@@ -216,6 +266,7 @@ void* opened(std::string_view name) {
   if (!std::filesystem::is_regular_file(path, failed)) bad_plugin(name, "there is no such file");
   if (is_cut_short(path)) bad_plugin(name, "cannot be loaded: the file is cut short");
   const auto whole = std::filesystem::absolute(path, failed);
+  const ArithmeticScope usual;  // constructors of global objects run
   void* handle = dlopen(whole.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) bad_plugin(name, "cannot be loaded: " + text_of(dlerror()));
   return handle;
@@ -243,8 +294,8 @@ Solver entry_of(void* handle, std::string_view name) {
     if (about == nullptr || about->size < static_cast<int>(sizeof *about)) {
       bad_plugin(name, "fclib_plugin_describe returned no struct fclib_plugin_about with its size");
     }
-    if (about->title != nullptr) entry.title = about->title;
-    entry.citation = text_of(about->citation);
+    if (about->title != nullptr) entry.title = told_text(name, "title", about->title);
+    entry.citation = told_text(name, "citation", about->citation);
     if (about->rolling != 0) entry.rolling_dimensions = {3, 5};
     for (const fclib_plugin_option* option = about->options;
          option != nullptr && option->name != nullptr; ++option) {

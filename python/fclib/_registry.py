@@ -37,6 +37,7 @@ RESERVED = {
     "guess",
     "callback",
     "history",
+    "merit",
 }
 OPTION_TYPES = {bool: "bool", int: "int", float: "float"}
 
@@ -102,8 +103,10 @@ def solver(
 
     Raises:
         OptionError: the name is that of a solver of the core.
-        TypeError: the function does not have such parameters.
+        TypeError: the function does not have such parameters, or there is no name.
     """
+    if not isinstance(name, str) or not name.strip():
+        raise TypeError(f"{name!r} is no name of a solver")
 
     def decorate(function: Function) -> Function:
         register(
@@ -113,7 +116,7 @@ def solver(
                 family=family,
                 title=title or (inspect.getdoc(function) or name).splitlines()[0],
                 citation=citation,
-                origin=function.__module__.partition(".")[0],
+                origin=(function.__module__ or "").partition(".")[0],
                 dimensions=tuple(dimensions),
                 rolling_dimensions=tuple(rolling_dimensions),
                 max_iterations=max_iterations,
@@ -157,8 +160,8 @@ def make_solver(
     ) -> npt.NDArray[np.float64]:
         try:
             answer = function(problem, r, monitor, **options)
-            result = np.asarray(r if answer is None else answer, dtype=float)
-        except Exception as error:
+            result = _reactions_of(r if answer is None else answer)
+        except (Exception, SystemExit) as error:
             # errors of the caller's callback are not the solver's, nor is a refusal
             if error is monitor.failure or isinstance(error, (_core.UnsuitableError, SolverError)):
                 raise
@@ -182,6 +185,15 @@ def make_solver(
         max_iterations=max_iterations,
         function=guarded,
     )
+
+
+def _reactions_of(answer: Any) -> npt.NDArray[np.float64]:
+    """What a function returned, as numbers: no part of it is dropped."""
+    array = np.asarray(answer)
+    if np.ma.is_masked(answer) or array.dtype.kind not in "fiub":
+        kind = "a masked array" if np.ma.is_masked(answer) else f"an array of {array.dtype}"
+        raise TypeError(f"returned {kind}, expected real numbers")
+    return array.astype(np.float64, copy=False)
 
 
 def _options_of(function: Callable[..., Any]) -> list[_core.OptionInfo]:
@@ -215,6 +227,7 @@ def _options_of(function: Callable[..., Any]) -> list[_core.OptionInfo]:
         if not choices and hint not in OPTION_TYPES:
             raise TypeError(f"{where}: is neither bool, int, float nor Literal of texts")
         type_name = "choice" if choices else OPTION_TYPES[hint]
+        _check_default(where, type_name, parameter.default, choices, about)
         infos.append(
             _core.OptionInfo(
                 name=parameter.name,
@@ -228,6 +241,22 @@ def _options_of(function: Callable[..., Any]) -> list[_core.OptionInfo]:
             )
         )
     return infos
+
+
+def _check_default(
+    where: str, type_name: str, default: Any, choices: Sequence[str], about: Option
+) -> None:
+    """What a user would be told of at the first solve, and could not mend, is told here."""
+    if type_name == "choice":
+        if default not in choices:
+            raise TypeError(f"{where}: its default {default!r} is none of {', '.join(choices)}")
+    elif isinstance(default, str) or not isinstance(default, (bool, int, float, np.number)):
+        raise TypeError(f"{where}: its default {default!r} is no {type_name}")
+    elif type_name != "bool" and not about.lowest <= default <= about.highest:
+        raise TypeError(
+            f"{where}: its default {default!r} is not between {about.lowest:g} and "
+            f"{about.highest:g}"
+        )
 
 
 def register(info: _core.SolverInfo) -> None:

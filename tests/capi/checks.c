@@ -4,6 +4,8 @@
  */
 #include "checks.h"
 
+#include <limits.h>
+
 /* one contact of a ball on a plane, sliding */
 static int columns[] = {0, 1, 2, 3, 4, 5, 6}, rows[] = {0, 1, 2, 3, 4, 5};
 static double one[] = {1, 1, 1, 1, 1, 1};
@@ -213,6 +215,14 @@ static void validation_and_merits(void) {
     pointless.nzmax = 1;
     CHECK(fclib_validate_local(&a));
   }
+  /* more entries than there is room for */
+  struct fclib_matrix crowded = identity;
+  crowded.p = crowded.i = unset;
+  crowded.nz = INT_MAX;
+  crowded.nzmax = 3;
+  a.W = &crowded;
+  CHECK(!fclib_validate_local(&a));
+  SAYS("/fclib_local/W/nz: 2147483647 entries, more than nzmax, 3");
   a = local();
   wrong[1] = NAN;
   CHECK(!fclib_validate_local_solution(&a, &s));

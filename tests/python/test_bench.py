@@ -669,6 +669,12 @@ def test_nothing_in_the_current_folder_is_run(
     assert not (tmp_path / "ran").exists()
 
 
+def test_a_module_that_ends_the_process_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "quits.py").write_text("import sys\nsys.exit(0)\n")
+    with pytest.raises(bench.CampaignError, match=r"quits.py: SystemExit: 0"):
+        campaign(modules=[str(tmp_path / "quits.py")])
+
+
 def test_a_module_does_not_take_the_place_of_another(tmp_path: Path) -> None:
     (tmp_path / "random.py").write_text("raise SystemExit\n")
     (tmp_path / "pytest.py").write_text("raise SystemExit\n")

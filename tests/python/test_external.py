@@ -1,6 +1,7 @@
 """Users' own solvers, programs and other packages behind the contract: what they may do wrong."""
 
 import contextlib
+import ctypes
 import importlib.util
 import os
 import re
@@ -112,6 +113,58 @@ def test_an_exception_comes_with_the_name_of_the_solver() -> None:
 def test_a_wrong_answer_is_said() -> None:
     with pytest.raises(fclib.SolverError, match=r"t-shape: returned an array of shape \(11,\)"):
         fclib.solve(problem_of(), "t-shape")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda r: r + 1j, "TypeError: returned an array of complex128"),
+        (lambda r: np.ma.masked_less(r - 1, 0), "TypeError: returned a masked array"),
+        (lambda r: [str(x) for x in r], "TypeError: returned an array of <U"),
+        (lambda _: sys.exit(0), "SystemExit: 0"),
+    ],
+)
+def test_nothing_of_an_answer_is_dropped(answer: Callable[[Any], Any], said: str) -> None:
+    """And a solver that ends its process ends no other."""
+
+    def give(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+        return answer(r)
+
+    fclib.solver("t-answers")(give)
+    with pytest.raises(fclib.SolverError, match=f"t-answers: {said}"):
+        fclib.solve(problem_of(), "t-answers")
+
+
+@pytest.mark.parametrize("name", ["", " ", None, 7])
+def test_a_solver_has_a_name(name: Any) -> None:
+    with pytest.raises(TypeError, match="is no name of a solver"):
+        fclib.solver(name)
+
+
+def test_defaults_that_no_user_can_mend_are_refused_at_once() -> None:
+    def own(p: Any, r: Any, monitor: Any, *, merit: float = 1.0) -> None: ...
+
+    def far(
+        p: Any, r: Any, monitor: Any, *, step: Annotated[float, fclib.Option(highest=1)] = 2.0
+    ) -> None: ...
+
+    def bounds(
+        p: Any, r: Any, monitor: Any, *, step: Annotated[float, fclib.Option(lowest=np.nan)] = 2.0
+    ) -> None: ...
+
+    def kind(p: Any, r: Any, monitor: Any, *, kind: Literal["a", "b"] = "c") -> None: ...  # type: ignore[assignment]
+
+    def text(p: Any, r: Any, monitor: Any, *, count: int = "3") -> None: ...  # type: ignore[assignment]
+
+    for function, said in {
+        own: "option merit: is a name that fclib.solve has itself",
+        far: "option step: its default 2.0 is not between -inf and 1",
+        bounds: "option step: its default 2.0 is not between nan and inf",
+        kind: "option kind: its default 'c' is none of a, b",
+        text: "option count: its default '3' is no int",
+    }.items():
+        with pytest.raises(TypeError, match=said):
+            fclib.solver("t-refused")(function)
 
 
 def test_what_a_callback_raises_is_not_the_solvers() -> None:
@@ -685,7 +738,13 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
         f"#include <fclib_plugin.h>\n{solve} {{ (void)p, (void)r; return 0; }}\n"
         'extern "C" const fclib_plugin_about* fclib_plugin_describe() { throw 7; }\n'
     )
-    thrown = ("throws", "throws-seven", "null", "told-nothing")
+    (folder / "upwards.cpp").write_text(
+        f"#include <fclib_plugin.h>\n#include <cfenv>\n{solve} {{\n"
+        "  std::fesetround(FE_UPWARD);\n  r[0] = 1 + 1e-8;\n"
+        "  p->stop(p->context, r);\n  return 0;\n}\n"
+    )
+    (folder / "latin.c").write_text(TELLS_OF_ITS_OPTIONS.replace('"Tells"', r'"Tells \xe9"'))
+    thrown = ("throws", "throws-seven", "null", "told-nothing", "upwards")
     sources = {name: folder / f"{name}.cpp" for name in thrown} | {
         "pgs": ROOT / "examples/plugin/pgs.c",
         "pgs-cpp": folder / "pgs.cpp",
@@ -694,6 +753,7 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "told": folder / "told.c",
         "wrong": folder / "wrong.c",
         "unsized": folder / "unsized.c",
+        "latin": folder / "latin.c",
     }
     for name, source in sources.items():
         tool = compiler("C++" if source.suffix == ".cpp" else "C")
@@ -792,6 +852,7 @@ def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
         "libother.so": "has no function fclib_plugin_solve",
         "libwrong.so": "its default is wrong: option count: 'two' is not an integer",
         "libunsized.so": "fclib_plugin_describe returned no struct fclib_plugin_about with",
+        "liblatin.so": "its title is not UTF-8",
     }.items():
         with pytest.raises(fclib.OptionError, match=error):
             fclib.solve(problem, f"plugin:{shared_objects}/{name}")
@@ -821,6 +882,23 @@ def test_what_a_shared_object_throws_is_said(shared_objects: Path, name: str, sa
 def test_a_shared_object_whose_description_throws(shared_objects: Path) -> None:
     with pytest.raises(fclib.OptionError, match="fclib_plugin_describe threw"):
         fclib.find_solver(f"plugin:{shared_objects}/libtold-nothing.so")
+
+
+def test_a_shared_object_leaves_the_arithmetic_as_it_was(shared_objects: Path) -> None:
+    """Neither the judge of its iterates nor the caller rounds as it does."""
+    name = f"plugin:{shared_objects}/libupwards.so"
+    problem = fclib.LocalProblem(spacedim=2, W=np.eye(2), q=[-1, 0], mu=[0.5])
+    mode = ctypes.CDLL(None).fegetround
+    before = mode()
+    heard = []
+
+    def hear(_iteration: int, error: float, *_: object) -> None:
+        heard.append((mode(), error))
+
+    result = fclib.solve(problem, name, 1e-10, callback=hear)
+    assert not result.converged
+    assert {round_to for round_to, _ in heard} == {mode()} == {before}
+    assert heard[0][1] == pytest.approx(1e-8)
 
 
 def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def load_modules(paths: list[str]) -> None:
         try:
             regular(path)  # to read a pipe waits for ever
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             del sys.modules[name]
             raise _registry.SolverError(f"{path}: {type(error).__name__}: {error}") from error
         _loaded[name] = path

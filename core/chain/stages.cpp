@@ -29,6 +29,9 @@ namespace {
 // with its solve and the rest of an iteration, over its multiplications.
 constexpr double sweep_operations = 60;
 constexpr double iteration_operations = 1500;
+// The time of a multiplication of a factorisation, over that of an operation of a sweep. The first
+// sweeps are weighed so; what goes on later may cost more than the factorisations.
+constexpr double time_of_multiplication = 0.25;
 
 constexpr double never_too_much = 256e6;    // [bytes] Factors of this size always fit.
 constexpr double spare_memory = 0.8;        // share of the available memory that factors may take
@@ -272,12 +275,14 @@ CoupledSystem& Island<Cone>::system() {
 template <class Cone>
 bool Island<Cone>::pays(double operations, double factorisations) {
   return operations <= factorisations * least_factorisation_cost(problem_) ||
-         operations <= factorisations * factorisation_cost(problem_, system());
+         operations <= factorisations * (least_factorisation_cost(problem_) +
+                                         time_of_multiplication * system().flops());
 }
 
 template <class Cone>
 void Island<Cone>::run(const GaussSeidelStage& rules) {
   const std::int64_t interval = sweeps_per_look;
+  const double worth = rules.worth * std::max(1.0, -std::log10(tolerance_));
   std::int64_t limit = rules.limit;
   double last = error_;
   std::int64_t k = 0;
@@ -300,7 +305,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
     if (rules.worth > 0 && k >= 2 * interval && k >= limit / 4) {
       const double rate = std::log(last / error) / static_cast<double>(count);
       const double left = std::log(error / tolerance_) / rate;
-      if (!(rate > 0) || !pays(left * sweep_cost(problem_), rules.worth)) return;
+      if (!(rate > 0) || !pays(left * sweep_cost(problem_), worth)) return;
       if (k == limit && left < extension * static_cast<double>(limit)) limit += interval;
     }
     last = error;

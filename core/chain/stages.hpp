@@ -59,8 +59,8 @@ class Island {
   // ---- the methods
 
   void run(const GaussSeidelStage& rules);
-  /// Whether so many operations cost at most so many factorisations. The system is analysed only if
-  /// that decides.
+  /// Whether so many operations of sweeps take at most the time of so many factorisations. The
+  /// system is analysed only if that decides.
   bool pays(double operations, double factorisations);
   /// The number of steps that a stage may make, from what one step costs.
   double paid_for(const Patience& rules);

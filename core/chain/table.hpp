@@ -110,15 +110,16 @@ struct GaussSeidelStage {
   static constexpr std::string_view families = "splitting";
   static constexpr std::string_view doc = "Sweeps of nonsmooth Gauss-Seidel.";
   std::int64_t limit = 100;
-  double worth = 12;
+  double worth = 3;
 
   static constexpr auto fields() {
     using O = GaussSeidelStage;
     return std::tuple{
         option("limit", &O::limit, "sweeps", {1, 1e9},
                "The largest number of sweeps. There are more if they converge soon."),
-        option("worth", &O::worth, "factorisations", {0},
-               "What the sweeps that are left, at their rate, may cost. 0: anything.")};
+        option("worth", &O::worth, "factorisations a digit", {0},
+               "What the sweeps that are left, at their rate, may cost for each digit of the "
+               "tolerance. 0: anything.")};
   }
 };
 

@@ -898,7 +898,8 @@ def compare(problems: list[Problem], arguments: argparse.Namespace) -> None:
         _results.store(
             arguments.results,
             rows,
-            title=f"auto beside another version ({arguments.other}), on problems it was not chosen on",
+            title=f"auto beside another version ({arguments.other}), on problems it was not chosen "
+            "on",
             note=f"{len(judging)} problems of {families} families of the judging half, at most "
             f"{arguments.problems} of a family, evenly spread. A failure counts as {longest:g} s; "
             "the mean is geometric, shifted by 1 ms. What "

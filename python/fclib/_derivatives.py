@@ -33,6 +33,7 @@ Smooth: TypeAlias = _laws.Problem
 BORDER = 1e-6
 # singular values below this, relative to the largest, are zero
 RANK = 1e-10
+REFINEMENTS = 3  # each one gives the digits of a double, less those of the conditioning
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +373,11 @@ class _Point:
         self.by_friction[name][a, group.part] = by_coefficient
 
     def _solve(self, transposed: bool, right: Array) -> tuple[Array, bool]:
-        """Solve by singular values, after rows and columns are scaled to the same size."""
+        """Solve by singular values, after rows and columns are scaled to the same size.
+
+        Large ratios of masses stay in the scaled system. So a unique solution is refined, with
+        residuals of more digits.
+        """
         system = self.system.T if transposed else self.system
         if system.size == 0:
             return np.zeros(len(right)), True
@@ -382,8 +387,19 @@ class _Point:
         rows[rows == 0] = 1
         left_scale, right_scale = (columns, rows) if transposed else (rows, columns)
         scaled = system / left_scale[:, None] / right_scale
-        found, _, rank, _ = np.linalg.lstsq(scaled, right / left_scale, rcond=RANK)
-        return found / right_scale, bool(rank == len(right))
+        u, values, v = np.linalg.svd(scaled)
+        kept = values > RANK * values[0]
+
+        def solved(b: Array) -> Array:
+            return np.asarray(v[kept].T @ (u[:, kept].T @ b / values[kept]))
+
+        wanted = right / left_scale
+        found = solved(wanted)
+        if kept.all():
+            more = scaled.astype(np.longdouble)
+            for _ in range(REFINEMENTS):
+                found += solved((wanted - more @ found).astype(np.float64))
+        return found / right_scale, bool(kept.all())
 
     def _velocity(self, change: dict[str, Array | None]) -> Array:
         """The change of u at the same unknowns."""

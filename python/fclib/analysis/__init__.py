@@ -18,7 +18,9 @@ _spatial.py     all solutions of one spatial contact, by the roots of polynomial
 _rational.py    linear systems and linear programs in exact arithmetic
 _certificate.py a proof that there is no solution, checked in exact arithmetic
 _reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
-_least_norm.py  the least of all reactions of a velocity. Needs _conic.py and _contacts.py
+_least_norm.py  the least of all reactions of a velocity. Needs _motion.py, _conic.py and
+                _reactions.py
+_motion.py      the reactions that move nothing, also with redundant joints. Needs _joints.py
 _conventions.py whether the normal component seems not to be first
 _contacts.py    statuses and energies, contact by contact
 _spectrum.py    ranks, singular values, definiteness

@@ -23,6 +23,7 @@ from fclib.analysis._data import (
     Reduced,
     asymmetry,
     balanced,
+    check_arguments,
     columns,
     norm,
 )
@@ -285,9 +286,11 @@ def analyze(
 
     Raises:
         fclib.ProblemError: the data is not valid.
+        fclib.OptionError: tol or time_limit is no number, or out of range.
         fclib.UnsuitableError: M is singular, so that there is no local form.
         ImportError: Clarabel is needed for the verdict, but not installed.
     """
+    check_arguments(problem, time_limit=time_limit, tol=tol)
     problem.validate()
     data = Data.of_problem(problem)
     matrices = data.matrices
@@ -426,6 +429,18 @@ def uniqueness(
     else:
         reason = f"the fixed point on mu ||u_T|| need not be a contraction ({constant:.2g})"
     return Uniqueness("undecided", reason, constant, full)
+
+
+def velocity_is_unique(data: Data) -> bool:
+    """Whether a theorem says that there is one velocity at most."""
+    reduced = data.reduced
+    if reduced is None:
+        return False
+    found = spectrum(reduced.W, DENSE, reduced.rounding)
+    sign = definiteness(data, reduced, found, DENSE)
+    rank = None if found.doubtful else found.rank
+    full = rank == data.problem.m and sign.word == DEFINITE[0]
+    return uniqueness(data, joints_of(data), sign, full, DENSE).verdict == "unique"
 
 
 def enumerated(found: Uniqueness, states: Enumeration) -> Uniqueness:

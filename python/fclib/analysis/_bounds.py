@@ -85,8 +85,12 @@ def lower_bound(a: Any) -> float:
         return 0.0
     labels = connected_components(a, directed=False)[1]
     order = np.argsort(labels, kind="stable")
-    least = inf
-    for block in np.split(order, np.cumsum(np.bincount(labels))[:-1]):
+    sizes = np.bincount(labels)
+    # rows that nothing couples, for example all of a diagonal matrix, at once
+    least = float(a.diagonal()[sizes[labels] == 1].min(initial=inf))
+    for block in np.split(order, np.cumsum(sizes)[:-1]):
+        if block.size == 1:
+            continue
         if block.size > DENSE:
             return -inf
         least = min(least, _lower_bound(a[block][:, block].toarray()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.linalg import cholesky, solve_triangular
 
-from fclib import _laws, _solve
+from fclib import _core, _laws, _solve
 from fclib._symmetry import SYMMETRIC as SYMMETRIC
 from fclib._symmetry import asymmetry as asymmetry
 from fclib._symmetry import columns as columns
@@ -23,6 +24,26 @@ Global: TypeAlias = _laws.Global
 
 DENSE = 2000  # largest side of a matrix that is treated densely
 EPS = float(np.finfo(float).eps)
+
+
+def check_arguments(
+    problem: object, *, time_limit: object, tol: object = 0.0, target: object = 1.0
+) -> None:
+    """The errors of `fclib.solve`, before anything is computed.
+
+    Raises:
+        fclib.ProblemError: the problem is none.
+        fclib.OptionError: a number is none, or out of range. A target must be positive.
+    """
+    _solve.check_problem(problem)
+    for name, value in (("tol", tol), ("target", target)):
+        if not isinstance(value, Real):
+            raise _core.OptionError(f"{name}: {value!r} is not a number")
+    if not isinstance(time_limit, Real):
+        raise _core.OptionError(f"time_limit: {time_limit!r} is not a number of seconds")
+    _solve.check_limits(float(tol), float(time_limit))  # type: ignore[arg-type]
+    if not 0 < float(target) < np.inf:  # type: ignore[arg-type]
+        raise _core.OptionError(f"target: {target} is not a positive finite number")
 
 
 def norm(x: Any) -> float:

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _laws, _solve
-from fclib.analysis._data import EPS, Array, columns, norm
+from fclib.analysis._data import EPS, Array, check_arguments, columns, norm
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError, Table, integers
 from fclib.analysis._spatial import one_contact
 
@@ -525,7 +525,9 @@ def enumerate_solutions(problem: _solve.Problem, *, time_limit: float = 5.0) -> 
 
     Raises:
         fclib.ProblemError: the data is not valid.
+        fclib.OptionError: time_limit is no positive number.
     """
+    check_arguments(problem, time_limit=time_limit)
     problem.validate()
     if why := qualifies(problem):
         return Enumeration((), why)

@@ -1,8 +1,13 @@
 """The reactions of least norm of a solution whose reactions are not unique.
 
-min ||r|| over W r = W r*, with r in the faces of the cones that the velocity allows: zero if the
-contact opens, a ray if it slides, K if it sticks. This conic program is solved island by island.
-Its answer is moved into the kernel of W on these faces, so that W r keeps its value up to rounding.
+min ||r|| over the r that have the same effect as r*, in the faces of the cones that the velocity
+allows: zero if the contact opens, a ray if it slides, K if it sticks. A contact at rest may carry
+load also if its r* is zero. This conic program is solved island by island. Its answer is moved into
+the directions that move nothing (_motion.py), so that the velocity is kept up to rounding.
+
+Rounding hides whether a contact with a tiny velocity is at rest. It counts as one at rest: then the
+faces are too large rather than too small. So reactions that are unique in them are unique, and the
+least ones in them are the least if they solve the problem.
 """
 
 from __future__ import annotations
@@ -12,68 +17,78 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import qr
 
 from fclib import _core, _laws
 from fclib.analysis._conic import Program
 from fclib.analysis._contacts import completed, velocity
 from fclib.analysis._data import DENSE, EPS, Array, Data
+from fclib.analysis._motion import NOISE, Effects, Motion, motion_of
+from fclib.analysis._reactions import MOVES, UNCERTAIN, faces_of, freedom
 
-MOVES = 1e-9  # a velocity above this, relative to max(||u||, ||q||), opens or slides
+UNIQUE, LEAST, SEVERAL, UNDECIDED = "unique", "minimum norm", "one of several", "undecided"
+CLOSE = 10.0  # times the error: velocities below this are zero in a second try
+OWN = 1e-6  # in the largest r_N: a reaction above this says in which direction it resists
+SAME = 1e-6  # relative difference of two reactions, or norms, that are not told apart
+PASSES = 6  # conic programs, each scaled by the norm that the last one found
+
+
+@dataclass(frozen=True)
+class Least:
+    """The least reactions that were found.
+
+    Attributes:
+        r: (m), l: (p) or None.
+        freedom: dimension of the directions in the faces that move nothing.
+        clear: whether no rank depends on rounding, and each program was solved.
+    """
+
+    r: Array
+    l: Array | None  # noqa: E741
+    freedom: int
+    clear: bool
 
 
 def least_norm(
     data: Data, solution: _core.Solution, target: float
 ) -> tuple[str, int, _core.Solution]:
-    """Whether the reactions of the velocity are unique, their freedom, and the least ones."""
-    problem, d = data.problem, data.d
-    if problem.nc == 0:
-        return "unique", 0, solution
-    _, u = completed(data, solution)
-    islands = data.local.islands()
-    local_W, r = data.W.tocsr(), solution.r.copy()
-    freedom, skipped = 0, False
-    threshold = MOVES * max(float(np.linalg.norm(u)), data.speed)
-    V = data.matrices.get("V")
-    order = np.argsort(islands.contact, kind="stable")
-    for island in np.split(order, np.cumsum(np.bincount(islands.contact))[:-1]):
-        rows = (d * island[:, None] + np.arange(d)).ravel()
-        if not r[rows].any():
-            continue
-        if rows.size > DENSE:
-            skipped = True
-            continue
-        block = local_W[rows][:, rows].toarray()
-        if V is not None:
-            # lambda may also change, without any change of velocity
-            block = _held(block, V.tocsr()[rows].toarray(), data.matrices["R"].toarray())
-        faces = _faces(data, island, r, u, threshold)
-        kernel = _kernel(block @ faces.basis)
-        if kernel.shape[1] == 0:
-            continue
-        freedom += kernel.shape[1]
-        least = _least_in(data, faces, block, r[rows], kernel)
-        if least is not None and np.linalg.norm(least) <= np.linalg.norm(r[rows]):
-            r[rows] = least
-    if freedom == 0:
-        return ("one of several" if skipped else "unique"), 0, solution
-    least_one = complete(data, _core.Solution(r=r, l=_multiplier(data, r)))
-    if skipped or not _core.merit(problem, least_one).error <= target:
-        return "one of several", freedom, solution
-    return "minimum norm", freedom, least_one
+    """Whether the reactions of the velocity are unique, their freedom, and the least ones.
+
+    The verdict is "unique", "minimum norm" (no reactions of this velocity are smaller), "one of
+    several" (there are others, perhaps smaller ones) or "undecided".
+    """
+    if data.problem.nc == 0:
+        return UNIQUE, 0, solution
+    error = max(_core.merit(data.problem, solution).error, EPS)
+    effects = Effects.of_data(data)
+    found = _least(effects, solution, max(MOVES, UNCERTAIN * error), error)
+    dimension = found.freedom
+    if dimension == 0 and found.clear:
+        return UNIQUE, 0, solution
+    other = None
+    if dimension:
+        other = _judged(data, found, target)
+        if other is not None and found.clear:
+            return LEAST, dimension, other
+        if other is None:
+            # some tiny velocities are not zero
+            closer = _least(effects, solution, CLOSE * max(error, target), error)
+            other = _judged(data, closer, target)
+    if other is not None and _differ(other.r, solution.r):
+        return SEVERAL, dimension, other
+    inside = faces_of(data, solution, error).inside
+    several = freedom(data, inside, DENSE).least > 0
+    return SEVERAL if several else UNDECIDED, dimension, solution
 
 
-def _held(W: Array, V: Array, R: Array) -> Array:
-    """W - V R^-1 V^T."""
-    return W - V @ np.linalg.solve(R, V.T)
+def _differ(r: Array, other: Array) -> bool:
+    scale = max(float(np.linalg.norm(r)), float(np.linalg.norm(other)))
+    return float(np.linalg.norm(r - other)) > SAME * scale
 
 
-def _multiplier(data: Data, r: Array) -> Array | None:
-    """Lambda from r."""
-    if "V" not in data.matrices or data.local.s is None:
-        return None
-    V, R = data.matrices["V"], data.matrices["R"]
-    return np.asarray(-np.linalg.solve(R.toarray(), V.T @ r + data.local.s))
+def _judged(data: Data, found: Least, target: float) -> _core.Solution | None:
+    """The solution of these reactions, or None if its merit is above the target."""
+    solution = complete(data, _core.Solution(r=found.r, l=found.l))
+    return solution if _core.merit(data.problem, solution).error <= target else None
 
 
 def complete(data: Data, solution: _core.Solution) -> _core.Solution:
@@ -86,114 +101,273 @@ def complete(data: Data, solution: _core.Solution) -> _core.Solution:
     return solution.replace(u=u)
 
 
+def _least(effects: Effects, solution: _core.Solution, moves: float, error: float) -> Least:
+    """The least reactions, island by island; those of an island that is not decided are kept.
+
+    Args:
+        effects: of the problem.
+        solution: a solution.
+        moves: a velocity above this, relative to max(||u||, ||q||), opens or slides.
+        error: of the solution, which bounds how well its velocity is known.
+    """
+    data, d = effects.data, effects.data.d
+    _, u = completed(data, solution)
+    speed = max(float(np.linalg.norm(u)), data.speed)
+    r = solution.r.copy()
+    multipliers = None if solution.l is None else solution.l.copy()
+    total, clear = 0, True
+    islands = data.local.islands().contact
+    order = np.argsort(islands, kind="stable")
+    for island in np.split(order, np.cumsum(np.bincount(islands))[:-1]):
+        rows = (d * island[:, None] + np.arange(d)).ravel()
+        faces = _faces(data, island, solution.r, u, moves * speed, error * speed)
+        if faces.size == 0:
+            continue
+        motion = motion_of(effects, rows, faces.basis)
+        if motion is None:
+            clear = False
+            continue
+        spread = np.linalg.norm(effects.lengths[rows].reshape(-1, d)[faces.at], axis=1)
+        noise = np.zeros(faces.size)
+        known = motion.lengths > 0
+        noise[known] = (faces.unsure * spread)[known] / motion.lengths[known]
+        kernel, sure = motion.kernel(noise)
+        clear = clear and sure
+        total += kernel.shape[1]
+        if kernel.shape[1] == 0 or not r[rows].any():
+            continue
+        least, solved = _least_in(faces, motion, r[rows], kernel)
+        clear = clear and solved
+        if least is None:
+            continue
+        if multipliers is not None and motion.joints.size:
+            effect = (effects.moved[:, rows] @ (least - r[rows]))[motion.rows]
+            multipliers[motion.joints] += motion.multipliers(effect)
+        r[rows] = least
+    return Least(r, multipliers, total, clear)
+
+
+@dataclass(frozen=True)
+class Cones:
+    """Limits ||factors * r_components|| <= bound r_N of contacts, of one group of components.
+
+    Attributes:
+        at: (k) places of the contacts in the island.
+        bound: (k); factors: (k, components).
+        components: the components of a contact that they bound.
+    """
+
+    at: Any
+    bound: Array
+    factors: Array
+    components: tuple[int, ...]
+
+    def rows(self, d: int, basis: Any) -> Any:
+        """Rows (contact by contact, k (1 + components)) times the coefficients are the cones."""
+        length = 1 + len(self.components)
+        stacked = sp.vstack(
+            [
+                sp.diags_array(self.bound) @ basis[d * self.at],
+                *(
+                    sp.diags_array(factor) @ basis[d * self.at + k]
+                    for factor, k in zip(self.factors.T, self.components, strict=True)
+                ),
+            ],
+            format="csr",
+        )
+        return stacked[np.arange(length * self.at.size).reshape(length, -1).T.ravel()]
+
+
 @dataclass(frozen=True)
 class Faces:
     """The reactions that a velocity allows, contact by contact.
 
     Attributes:
-        basis: (d contacts, directions): unit vectors if nothing slides.
-        sticking: places in the island of contacts that may have any reaction in K.
-        rays: the directions of sliding contacts; their coefficients are not negative.
-        contacts: the contacts of the island.
+        d: the number of components of a contact.
+        basis: (d contacts x directions), orthonormal.
+        at: (directions) place of the contact in the island.
+        unsure: (directions) how well a direction is known, as it is that of a velocity.
+        normals: directions with a normal part; their coefficients are not negative.
+        cones: the limits of components that do not move.
     """
 
-    basis: Array
-    sticking: Any
-    rays: Any
-    contacts: Any
+    d: int
+    basis: Any
+    at: Any
+    unsure: Array
+    normals: Any
+    cones: tuple[Cones, ...]
+
+    @property
+    def size(self) -> int:
+        """The number of directions."""
+        return int(self.basis.shape[1])
 
 
-def _faces(data: Data, island: Any, r: Array, u: Array, threshold: float) -> Faces:
+def _faces(data: Data, island: Any, r: Array, u: Array, threshold: float, blur: float) -> Faces:
+    """The faces of an island's contacts.
+
+    Args:
+        data: of the problem.
+        island: its contacts.
+        r: (m) of the solution.
+        u: (m) of the solution.
+        threshold: [m/s] a velocity above this opens, slides, spins or rolls.
+        blur: [m/s] error of the velocities.
+    """
     d = data.d
-    entries: list[tuple[int, int, float]] = []
-    sticking, rays = [], []
-    count = 0
-    for at, contact in enumerate(island):
+    pressed = OWN * float(abs(r[::d]).max(initial=0.0))
+    directions: list[Array] = []
+    at: list[int] = []
+    unsure: list[float] = []
+    normals: list[int] = []
+    resting: list[list[int]] = [[] for _ in data.friction]
+    for place, contact in enumerate(island):
         own = slice(d * contact, d * contact + d)
         reaction, speed = r[own], u[own]
-        if not reaction.any() or speed[0] > threshold:
+        if speed[0] > threshold:
             continue
-        if np.linalg.norm(speed[1:]) > threshold:
-            # it slides, or rolls: its reaction keeps its direction
-            direction = reaction / np.linalg.norm(reaction)
-            entries += [(d * at + k, count, float(direction[k])) for k in range(d)]
-            rays.append(count)
-            count += 1
-            continue
-        entries += [(d * at + k, count + k, 1.0) for k in range(d)]
-        sticking.append(at)
-        count += d
-    basis = np.zeros((d * len(island), count))
-    for row, column, value in entries:
-        basis[row, column] = value
-    return Faces(basis, np.array(sticking, int), np.array(rays, int), island)
+        ray, free, doubt = np.zeros(d), [], 0.0
+        ray[0] = 1
+        for group, places in zip(data.friction, resting, strict=True):
+            axes = group.axes[contact]
+            if not axes.any():
+                continue
+            moving = speed[group.part] * (axes > 0)
+            rate = float(np.linalg.norm(moving))
+            if rate > threshold:
+                pull = reaction[group.part] / reaction[0] if reaction[0] > pressed else None
+                ray[group.part] = _against(group, axes, moving) if pull is None else pull
+                doubt = max(doubt, blur / rate)
+            else:
+                free += [k for k, axis in zip(range(d)[group.part], axes, strict=True) if axis > 0]
+                places.append(place)
+        normals.append(len(at))
+        at += [place] * (1 + len(free))
+        unsure += [doubt] + [0.0] * len(free)
+        directions += [ray / np.linalg.norm(ray), *np.eye(d)[free]]
+    values = np.array(directions).reshape(len(at), d)
+    rows = d * np.array(at, int)[:, None] + np.arange(d)
+    places_of = np.repeat(np.arange(len(at)), d)
+    basis = sp.csr_array(
+        (values.ravel(), (rows.ravel(), places_of)), shape=(d * len(island), len(at))
+    )
+    basis.eliminate_zeros()
+    cones = []
+    for group, places in zip(data.friction, resting, strict=True):
+        axes = group.axes[island[places]]
+        bound = axes.max(axis=1, initial=0.0)
+        factors = np.divide(bound[:, None], axes, out=np.zeros_like(axes), where=axes > 0)
+        if places:
+            cones.append(Cones(np.array(places), bound, factors, tuple(range(d)[group.part])))
+    return Faces(
+        d, basis, np.array(at, int), np.array(unsure), np.array(normals, int), tuple(cones)
+    )
 
 
-def _kernel(a: Array) -> Array:
-    """An orthonormal basis of the kernel."""
-    if a.shape[1] == 0:
-        return np.zeros((0, 0))
-    # the rows' complement: A^T P = Q R with falling |R_kk|
-    q, upper, _ = qr(a.T, pivoting=True)
-    values = abs(np.diag(upper))
-    limit = 10 * max(a.shape) * EPS * values.max(initial=0)
-    return np.asarray(q[:, int((values > limit).sum()) :])
+def _against(group: _laws.Group, axes: Array, moving: Array) -> Array:
+    """The reaction of a group that moves, over r_N: on the border of its section."""
+    if group.uniform:
+        return np.asarray(-axes * moving / np.linalg.norm(moving))
+    return np.asarray(-axes * axes * moving / np.linalg.norm(axes * moving))
 
 
-def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Array | None:
-    """The reaction of least norm with the same W r, or None if it was not found.
+def _least_in(faces: Faces, motion: Motion, r: Array, kernel: Array) -> tuple[Array | None, bool]:
+    """The reactions of least norm with the same effect, and whether they are known to be the least.
 
-    The conic program violates W r and the cones by its tolerance. Its answer is moved into the
-    kernel. Then Newton steps of least norm on the violated constraints end at rounding.
+    None if they were not found. If their norm is far below that of r, the program is solved again
+    from there, so that its tolerance counts in the new norm.
     """
-    d, B = data.d, sp.csr_array(faces.basis)
-    size = B.shape[1]
-    scale = float(np.linalg.norm(r))
-    start = faces.basis.T @ r / scale  # the columns are orthonormal
-    A = W @ faces.basis
-    A = sp.csr_array(np.where(abs(A) > EPS * abs(A).max(), A, 0) / abs(A).max())
+    found, solved = None, False
+    for _ in range(PASSES):
+        scale = float(np.linalg.norm(r))
+        if scale == 0:
+            return r, True
+        start = faces.basis.T @ r / scale  # the columns are orthonormal
+        c, solved = _program(faces, motion, start, kernel)
+        if c is None:
+            return found, False
+        size = float(np.linalg.norm(c))
+        if size > 1 + SAME:
+            return found, False
+        r = found = scale * (faces.basis @ c)
+        if size > 0.1:
+            break
+    return found, solved
+
+
+def _program(
+    faces: Faces, motion: Motion, start: Array, kernel: Array
+) -> tuple[Array | None, bool]:
+    """The least coefficients c with the effect of `start`, and whether they are shown to be so.
+
+    The conic program violates the effect and the cones by its tolerance. Its answer is moved into
+    the kernel. Then Newton steps of least norm on the violated constraints end at rounding. The
+    dual value of the program is the bound below which no norm is.
+    """
+    size = faces.size
+    A = _equations(motion)
     program = Program(size)
     program.equal(A, A @ start)
-    at = faces.sticking
-    if not all(group.uniform for group in data.friction):
-        return None
-    limits = [
-        (group.coefficient[faces.contacts[at]], list(range(d))[group.part])
-        for group in data.friction
-    ]
-    for mu, components in limits:
-        stacked = sp.vstack(
-            [sp.diags_array(mu) @ B[d * at], *(B[d * at + k] for k in components)], format="csr"
-        )
-        length = 1 + len(components)
-        order = np.arange(length * at.size).reshape(length, -1).T.ravel()
-        program.second_order(stacked[order], np.zeros(order.size), length)
-    program.nonnegative(B[d * at], np.zeros(at.size))
-    rays = sp.csr_array(sp.eye_array(size, format="csr")[faces.rays])
-    program.nonnegative(rays, np.zeros(faces.rays.size))
+    for cones in faces.cones:
+        rows = cones.rows(faces.d, faces.basis)
+        program.second_order(rows, np.zeros(rows.shape[0]), 1 + len(cones.components))
+    normals = sp.csr_array(sp.eye_array(size, format="csr")[faces.normals])
+    program.nonnegative(normals, np.zeros(faces.normals.size))
     answer = program.solve(np.zeros(size), sp.eye_array(size, format="csc"), tol=1e-11)
     z = kernel.T @ (np.array(answer.x) - start)
     if not np.isfinite(z).all():
-        return None
+        return None, False
+    c = _inside(faces, start, kernel, z)
+    value = float(c @ c) / 2
+    return c, bool(value - answer.obj_val_dual <= SAME * max(value, SAME))
+
+
+def _equations(motion: Motion) -> Any:
+    """The rows that say that the effect stays, each of size one.
+
+    Small entries are left out: a row of rounding would forbid what moves nothing.
+    """
+    small = max(10 * max(motion.left.shape) * motion.rounding, NOISE) * motion.lengths
+    A = np.where(abs(motion.left) <= small, 0.0, motion.left)
+    largest = abs(A).max(axis=1, initial=0.0)
+    A = A[largest > 0] / largest[largest > 0, None]
+    return sp.csr_array(np.where(abs(A) > EPS, A, 0.0))
+
+
+def _inside(faces: Faces, start: Array, kernel: Array, z: Array) -> Array:
+    """The coefficients start + kernel z, moved by least steps until no constraint is violated."""
     for _ in range(10):
         c = start + kernel @ z
         x = faces.basis @ c
-        gaps, gradients = [], []
-        for mu, components in limits:
-            tangent = np.stack([x[d * at + k] for k in components], axis=1)
-            norm = np.linalg.norm(tangent, axis=1)
-            gap = mu * x[d * at] - norm
-            for k in np.flatnonzero(gap < -EPS * norm):
-                gradient = mu[k] * faces.basis[d * at[k]]
-                for j, component in enumerate(components):
-                    along = faces.basis[d * at[k] + component]
-                    gradient = gradient - tangent[k, j] / norm[k] * along
-                gaps.append(gap[k])
-                gradients.append(gradient @ kernel)
-        for k in faces.rays[c[faces.rays] < 0]:
-            gaps.append(c[k])
+        gaps: list[float] = []
+        gradients: list[Array] = []
+        for k in faces.normals[c[faces.normals] < 0]:
+            gaps.append(float(c[k]))
             gradients.append(kernel[k])
+        for cones in faces.cones:
+            _violations(faces, cones, x, kernel, gaps, gradients)
         if not gaps:
             break
         z = z - np.linalg.lstsq(np.array(gradients), np.array(gaps), rcond=1e-8)[0]
-    return scale * x
+    return c
+
+
+def _violations(
+    faces: Faces, cones: Cones, x: Array, kernel: Array, gaps: list[float], gradients: list[Array]
+) -> None:
+    """Add the gaps of violated cones at the reactions x, and their gradients by z."""
+    d, at = faces.d, cones.at
+    pulls = np.stack(
+        [f * x[d * at + k] for f, k in zip(cones.factors.T, cones.components, strict=True)], axis=1
+    )
+    norms = np.linalg.norm(pulls, axis=1)
+    found = cones.bound * x[d * at] - norms
+    # aim a little inside, so that the cones still hold once r is rounded
+    for k in np.flatnonzero((found < 0) & (norms > 0)):
+        weights = np.zeros(d)
+        weights[0] = cones.bound[k]
+        weights[list(cones.components)] = -cones.factors[k] * pulls[k] / norms[k]
+        own = faces.basis[d * at[k] : d * at[k] + d]
+        gaps.append(float(found[k] - 4 * EPS * norms[k]))
+        gradients.append((own.T @ weights) @ kernel)

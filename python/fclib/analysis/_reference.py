@@ -1,9 +1,14 @@
 """Reference solutions: to the limit of double precision, by two unrelated algorithms.
 
 The first algorithm gives the solution, the second one confirms it: it shares no iteration with the
-first, and its velocity must agree. It starts from zero. If it fails, or ends at another solution
-(frictional problems may have several), it starts again from the first's reactions, rounded to three
-digits.
+first, and its velocity must agree. It starts from zero. If no run from zero reaches a solution, it
+starts again from the first's reactions, rounded to three digits. If this start is itself a
+solution, the reactions are disturbed: a run that has nothing to do confirms nothing.
+
+If all runs from zero that reach a solution end at another velocity, the solution is not certified.
+Frictional problems may have several solutions. Or the problem is so close to singular that an error
+within the target does not tell the velocity. Such a velocity is that of another solution only if
+their mean is clearly no solution, and if no theorem says that there is one velocity.
 
 If the reactions of a velocity are not unique, the solution has those of least norm
 (`_least_norm.py`).
@@ -19,14 +24,21 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _registry, _solve
+from fclib.analysis._analyze import velocity_is_unique
 from fclib.analysis._contacts import completed
-from fclib.analysis._data import Array, Data
+from fclib.analysis._data import Array, Data, check_arguments
 from fclib.analysis._least_norm import least_norm
 
 TARGET = 1e-12  # for the merit
 CONFIRMED = 1e2  # the confirming error may be this many times the target
 AGREE = 1e-8  # distance of the velocities, relative to max(||u||, ||q||)
 DIGITS = 3  # digits of the reactions from which a second try starts
+CLEAR = 1e2  # a start must miss the confirming error by this factor
+DISTURBED = 2.0**-10  # size of the disturbance, relative to the reactions
+# Of two solutions with an error e, min(r, u) is at most about the root of e at their mean if both
+# approximate one solution of a monotone problem. The mean of others has an error of more than so
+# many roots.
+APART = 10.0
 
 FIRST = ("auto", "nsn-jm", "nsn-ac", "ppa-nsn", "admm", "nsgs", "apgd")
 SECOND = ("nsn-jm", "nsn-ac", "admm", "apgd", "aclm", "nsgs", "fp-eg-upk", "ppa-nsgs")
@@ -41,7 +53,8 @@ class Confirmation:
         error: the merit it reached; status: of the result.
         difference: distance of its velocity from the reference's, relative to max(||u||, ||q||); 0
             for the first.
-        start: "zero" or "rounded", the first's reactions, to three digits.
+        start: "zero", "rounded" (the first's reactions, to three digits) or "disturbed".
+        iterations: the number of its iterations; a run without any confirms nothing.
     """
 
     solver: str
@@ -50,6 +63,7 @@ class Confirmation:
     status: str
     difference: float
     start: str
+    iterations: int = 0
 
 
 @dataclass(frozen=True)
@@ -62,10 +76,11 @@ class Reference:
         target: target of the merit.
         runs: the runs of the algorithms: the first, and those that should confirm it.
         confirmed: whether a run without a common family agrees.
-        reaction: "unique" (given the velocity), "minimum norm" or "one of several".
+        reaction: "unique" (given the velocity), "minimum norm" (no reactions of this velocity are
+            smaller), "one of several" or "undecided"; "none" without a solution.
         freedom: dimension of the reactions of this velocity, before the cones bound them.
-        others: velocity differences of other solutions found, with an error within the target: the
-            velocity is not unique.
+        others: velocity differences of other solutions found, with an error within the target, if
+            this error does not explain the difference: the velocity is not unique.
         reason: the reason why it is not certified; empty if it is.
     """
 
@@ -173,9 +188,11 @@ def reference(
 
     Raises:
         fclib.ProblemError: the data is not valid.
-        fclib.UnsuitableError: M or R is singular.
+        fclib.OptionError: target or time_limit is no positive number.
+        fclib.UnsuitableError: M is singular, or joints contradict each other.
         ImportError: reactions are not unique, and Clarabel is not installed.
     """
+    check_arguments(problem, time_limit=time_limit, target=target)
     problem.validate()
     data = Data.of_problem(problem)
     first, run = _first(data, target, time_limit)
@@ -183,25 +200,24 @@ def reference(
         reason = f"no algorithm came nearer than {first.error:.1e}"
         return Reference(problem, None, None, target, (run,), False, "none", 0, (), reason)
     solution = first.solution
-    runs, confirmed, others = _confirm(data, solution, run, target, time_limit)
+    check = _confirm(data, solution, run, target, time_limit)
     reaction, freedom, solution = least_norm(data, solution, target)
     merit = _core.merit(problem, solution)
     reasons = []
     if not merit.error <= target:
         reasons.append(f"the error {merit.error:.1e} is above {target:.0e}")
-    if not confirmed:
-        tries = min((r.difference for r in runs[1:]), default=float("nan"))
-        reasons.append(f"no unrelated algorithm agrees (the nearest differs by {tries:.1e})")
+    if check.doubt:
+        reasons.append(check.doubt)
     return Reference(
         problem,
         solution,
         merit,
         target,
-        runs,
-        confirmed,
+        check.runs,
+        not check.doubt,
         reaction,
         freedom,
-        others,
+        check.others,
         "; ".join(reasons),
     )
 
@@ -234,20 +250,30 @@ def _first(data: Data, target: float, time_limit: float) -> tuple[_core.Result, 
         if best.error <= target or best.status == "infeasible":
             break
     assert best is not None
-    run = Confirmation(best.solver, _families(best), best.error, best.status, 0.0, "zero")
+    run = Confirmation(
+        best.solver, _families(best), best.error, best.status, 0.0, "zero", best.iterations
+    )
     return best, run
+
+
+@dataclass(frozen=True)
+class _Check:
+    """The first run and those that should confirm it, and why they do not; see Reference."""
+
+    runs: tuple[Confirmation, ...]
+    others: tuple[float, ...]
+    doubt: str = ""
 
 
 def _confirm(
     data: Data, solution: _core.Solution, run: Confirmation, target: float, time_limit: float
-) -> tuple[tuple[Confirmation, ...], bool, tuple[float, ...]]:
+) -> _Check:
     """Runs of other families until one agrees, and the velocities of other solutions."""
     _, u = completed(data, solution)
     speed = max(float(np.linalg.norm(u)), data.speed)
     tried: list[Confirmation] = [run]
     others: list[float] = []
-    for start in ("zero", "rounded"):
-        guess = None if start == "zero" else _rounded(solution)
+    for start, guess in _starts(data, solution, CLEAR * CONFIRMED * target):
         # do not wait for a solution that does not come soon from zero
         limit = min(time_limit, 2.0) if start == "zero" else time_limit
         for name in SECOND:
@@ -260,23 +286,84 @@ def _confirm(
                 continue
             difference = float(np.linalg.norm(completed(data, result.solution)[1] - u)) / speed
             found = Confirmation(
-                name, (info.family,), result.error, result.status, difference, start
+                name,
+                (info.family,),
+                result.error,
+                result.status,
+                difference,
+                start,
+                result.iterations,
             )
             tried.append(found)
-            if found.error <= CONFIRMED * target and difference <= AGREE:
-                return tuple(tried), True, tuple(others)
-            if found.error <= target and difference > AGREE:
+            # that r = 0 is a solution is seen without any iteration
+            worked = found.iterations > 0 or not result.solution.r.any()
+            if worked and found.error <= CONFIRMED * target and difference <= AGREE:
+                return _Check(tuple(tried), tuple(others))
+            if (
+                found.error <= target
+                and difference > AGREE
+                and _another(data, solution, result.solution, target)
+            ):
                 others.append(difference)
-    return tuple(tried), False, tuple(others)
+        away = [one.difference for one in tried[1:] if one.error <= target]
+        if start == "zero" and away:
+            doubt = (
+                "each unrelated algorithm that reaches a solution from zero ends at another"
+                f" velocity (the nearest differs by {min(away):.1e})"
+            )
+            return _Check(tuple(tried), tuple(others), doubt)
+    nearest = min((one.difference for one in tried[1:]), default=float("nan"))
+    doubt = f"no unrelated algorithm agrees (the nearest differs by {nearest:.1e})"
+    return _Check(tuple(tried), tuple(others), doubt)
 
 
 def _takes(info: _core.SolverInfo, data: Data) -> bool:
     return data.d in _registry.dimensions_of(info, data.problem.kind)
 
 
-def _rounded(solution: _core.Solution) -> _core.Solution:
-    def short(x: Array) -> Array:
-        return np.array([float(f"{value:.{DIGITS - 1}e}") for value in x])
+def _starts(
+    data: Data, solution: _core.Solution, bound: float
+) -> list[tuple[str, _core.Solution | None]]:
+    """The starts of confirming runs: those with a merit above the bound.
 
-    multiplier = None if solution.l is None else short(solution.l)
-    return _core.Solution(r=short(solution.r), l=multiplier)
+    Solvers start from reactions, so each start has the multipliers of the solution.
+    """
+    if data.problem.nc == 0:
+        return [("zero", None)]
+
+    def misses(r: Array) -> bool:
+        return _core.merit(data.problem, _core.Solution(r=r, l=solution.l)).error > bound
+
+    starts: list[tuple[str, _core.Solution | None]] = []
+    if misses(np.zeros(data.problem.m)):
+        starts.append(("zero", None))
+    near = [("rounded", _rounded(solution.r))]
+    near += [("disturbed", _disturbed(data, solution.r, sign)) for sign in (1, -1)]
+    found = [(name, r) for name, r in near if misses(r)]
+    return starts + [(name, _core.Solution(r=r, l=solution.l)) for name, r in found[:1]]
+
+
+def _rounded(r: Array) -> Array:
+    return np.array([float(f"{value:.{DIGITS - 1}e}") for value in r])
+
+
+def _disturbed(data: Data, r: Array, sign: int) -> Array:
+    """Reactions with other normal parts, each changed by another amount."""
+    usual = max(float(abs(r).max()), data.speed / data.stiffness)
+    found = r.copy()
+    found[:: data.d] += sign * DISTURBED * usual * np.linspace(1, 2, data.problem.nc)
+    return found
+
+
+def _another(data: Data, solution: _core.Solution, other: _core.Solution, target: float) -> bool:
+    """Whether two velocities are of two solutions, and no error explains their difference."""
+
+    def mean(name: str) -> Array | None:
+        a, b = getattr(solution, name), getattr(other, name)
+        return None if a is None or b is None else (a + b) / 2
+
+    r = (solution.r + other.r) / 2
+    between = _core.Solution(r=r, l=mean("l"), v=mean("v"))
+    if not _core.merit(data.problem, between).error > APART * float(np.sqrt(target)):
+        return False
+    return not velocity_is_unique(data)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import fclib
 from fclib import analysis
-from fclib.analysis import _brief, _existence, _spectrum
+from fclib.analysis import _brief, _existence, _reference, _spectrum
 from fclib.analysis._brief import brief
 from fclib.analysis._data import Data
 from helpers import (
@@ -717,6 +717,259 @@ def test_no_reference_where_there_is_no_solution() -> None:
     json.dumps(found.record, allow_nan=False)
     with pytest.raises(fclib.ProblemError, match="no solution"):
         _ = found.attributes
+
+
+def twins(push: float = 0.0, mu: float = 0.5) -> fclib.LocalProblem:
+    """A mass on two contacts in the same place: each may carry the load."""
+    J = np.tile(np.eye(2), (2, 1))
+    return fclib.LocalProblem(spacedim=2, W=J @ J.T, q=J @ [-1.0, push], mu=[mu, mu])
+
+
+@pytest.mark.parametrize(("push", "mu"), [(0.0, 0.5), (0.25, 0.5), (2.0, 0.5), (2.0, 0.0)])
+def test_contacts_at_rest_without_reaction_may_carry_load(push: float, mu: float) -> None:
+    problem = twins(push, mu)
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.reaction == "minimum norm"
+    assert found.solution is not None
+    r = found.solution.r.reshape(2, 2)
+    np.testing.assert_allclose(r[:, 0], 0.5, atol=1e-9)
+    np.testing.assert_allclose(r[0], r[1], atol=1e-9)
+    assert found.error <= 1e-12
+
+
+def test_a_contact_that_nothing_moves_may_carry_load() -> None:
+    W = np.diag([1.0, 1, 0, 0])
+    for q in ([-1.0, 0, 0, 0], [-1.0, 2, 0, 0], [1.0, 0, 0, 0], [0.0, 0, 0, 0]):
+        found = analysis.reference(fclib.LocalProblem(spacedim=2, W=W, q=q, mu=[0.5, 0.5]))
+        assert found.certified, found.reason
+        assert (found.reaction, found.freedom) == ("minimum norm", 2)
+    still = fclib.GlobalProblem(
+        spacedim=2, M=np.eye(2), H=np.zeros((2, 2)), f=[1, 0], w=np.zeros(2), mu=[0.5]
+    )
+    found = analysis.reference(still)
+    assert (found.reaction, found.freedom) == ("minimum norm", 2)
+
+
+@pytest.mark.parametrize("law", ["plain", "rolling", "spin", "ellipsoid"])
+@pytest.mark.parametrize("move", [0, 1])
+def test_the_least_reactions_of_twins_of_every_law(law: str, move: int) -> None:
+    d = {"plain": 3, "rolling": 5}.get(law, 4)
+    J = np.tile(np.eye(d), (2, 1))
+    free = np.zeros(d)
+    free[0], free[1] = -1, 2.0 * move
+    kind, extra = {
+        "plain": (fclib.LocalProblem, {}),
+        "rolling": (fclib.LocalRollingProblem, {"mu_r": [0.25] * 2}),
+        "spin": (fclib.LocalSpinProblem, {"mu_s": [0.25] * 2}),
+        "ellipsoid": (fclib.LocalSpinProblem, {"mu_s": [0.25] * 2, "coupled": True}),
+    }[law]
+    make: Any = kind
+    assert isinstance(extra, dict)
+    problem = make(spacedim=d, W=J @ J.T, q=J @ free, mu=[0.5, 0.5], **extra)
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.reaction == "minimum norm"
+    # what slides may only share the load along its ray; what spins or rolls besides is still free
+    free_parts = {"plain": (3, 1), "rolling": (5, 3), "spin": (4, 2), "ellipsoid": (4, 1)}
+    assert found.freedom == free_parts[law][move]
+    assert found.solution is not None
+    r = found.solution.r.reshape(2, d)
+    np.testing.assert_allclose(r[0], r[1], atol=1e-8)
+    np.testing.assert_allclose(r[0, :2], [0.5, -0.25 * move], atol=1e-8)
+
+
+def test_reactions_are_undecided_where_rounding_hides_the_rank() -> None:
+    g = 2.0**-20
+    J = np.array([[1.0, 0, 0], [0, 1, 0], [1, 0, g], [0, 1, 0]])
+    problem = fclib.LocalProblem(spacedim=2, W=J @ J.T, q=J @ [-1.0, 0, 0], mu=[0.5, 0.5])
+    found = analysis.reference(problem)
+    # the exact reactions are unique in N; an error of 1e-12 does not tell
+    assert found.reaction in ("undecided", "one of several")
+
+
+def test_a_run_that_does_nothing_confirms_nothing() -> None:
+    g = 2.0**-22
+    J = np.zeros((6, 6))
+    J[0, 0] = J[2, 0] = J[4, 1] = J[4, 2] = J[1, 3] = J[3, 4] = J[5, 5] = 1
+    J[2, 1] = g
+    W = J @ J.T
+    r, u = np.array([1.5, 0, 0.5, 0, 0, 0]), np.array([0.0, 0, 0, 0, 1, 0])
+    problem = fclib.LocalProblem(spacedim=2, W=W, q=u - W @ r, mu=np.zeros(3))
+    found = analysis.reference(problem)
+    # the velocity is unique, as analyze says: an error within the target does not tell it
+    assert analysis.analyze(problem).uniqueness.verdict == "unique"
+    assert found.others == ()
+    assert not found.certified
+    assert "another velocity" in found.reason
+    assert found.second is None
+
+
+@pytest.mark.parametrize("q", [[-1.0, 0], [-1.0, 0.25], [1.0, 0], [-1.0, 2]])
+def test_a_confirming_run_starts_away_from_the_solution(q: list[float]) -> None:
+    problem = fclib.LocalProblem(spacedim=2, W=np.eye(2), q=q, mu=[0.5])
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.second is not None
+    assert found.second.iterations > 0
+    assert found.others == ()
+
+
+def test_other_solutions_are_found_where_there_are_some() -> None:
+    # Klarbring 1990
+    W = np.linalg.inv([[2.0, -1.0], [-1.0, 1.0]])
+    problem = fclib.LocalProblem(spacedim=2, W=W, q=[1.0, 3.5], mu=[2.0])
+    stick = analysis.enumerate_solutions(problem).isolated[2]
+    solved = analysis.reference(problem)
+    assert solved.solution is not None
+    data = Data.of_problem(problem)
+    assert _reference._another(data, solved.solution, stick.solution, 1e-12)
+    assert not _reference._another(data, solved.solution, solved.solution, 1e-12)
+
+
+def jointed(G: Any, M: Any = (1.0, 2, 3)) -> fclib.GlobalProblem:
+    """A body on two contacts, with joints that may be redundant."""
+    H = np.zeros((3, 4))
+    H[0, 0] = H[1, 1] = H[0, 2] = H[1, 3] = 1
+    H[2, 1], H[2, 3] = 0.3, -0.3
+    p = np.shape(G)[1]
+    return fclib.GlobalProblem(
+        spacedim=2,
+        M=np.diag(M),
+        H=H,
+        f=[-1, 0.5, 0.1],
+        w=np.zeros(4),
+        mu=[0.5, 0.5],
+        G=G,
+        b=np.zeros(p),
+    )
+
+
+@pytest.mark.parametrize(
+    "G",
+    [
+        [[0.0, 0], [0.1, 0.1], [1 / 3, 1 / 3]],
+        [[0.0, 0], [0.1, 0], [1 / 3, 0]],
+        [[0.0, 0], [0.1, 0.1 * (1 + 3e-16)], [1 / 3, 1 / 3]],
+        [[0.0, 0], [0.0, 0], [0, 0]],
+    ],
+)
+def test_references_with_redundant_joints(G: list[list[float]], tmp_path: Path) -> None:
+    problem = jointed(G)
+    found = analysis.reference(problem)
+    assert found.solution is not None
+    assert found.error <= 1e-12
+    assert found.solution.l is not None
+    assert np.isfinite(found.solution.l).all()
+    path = tmp_path / "jointed.hdf5"
+    fclib.write(path, problem)
+    # it slides with more than one velocity: the status says so, and nothing is raised
+    record = json.loads(run("analyze", "--reference", "--json", path, code=None).stdout)
+    assert record["reference_reaction"] == found.reaction
+
+
+def test_the_least_reactions_beside_redundant_joints() -> None:
+    # the joints leave one direction free, and both contacts act along it
+    H = np.zeros((3, 4))
+    H[0, 0] = H[1, 1] = H[0, 2] = H[1, 3] = 1
+    G = np.array([[0.0, 0, 0], [1, 2, 0], [1, 2, 0]])
+    problem = fclib.GlobalProblem(
+        spacedim=2,
+        M=np.diag([1.0, 2.0**20, 1]),
+        H=H,
+        f=[-1, 0, 0],
+        w=np.zeros(4),
+        mu=[0.5, 0.5],
+        G=G,
+        b=np.zeros(3),
+    )
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.reaction == "minimum norm"
+    assert found.solution is not None
+    np.testing.assert_allclose(found.solution.r, [0.5, 0, 0.5, 0], atol=1e-9)
+    assert found.error <= 1e-12
+
+
+@pytest.mark.parametrize("kind", ["local", "global"])
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_least_reactions_are_no_larger_than_known_ones(kind: str, mu: float) -> None:
+    """Planted problems with dyadic data, contacts at rest without reaction, and many masses."""
+    rng = np.random.default_rng(7)
+    for _ in range(25):
+        nc, d = int(rng.integers(2, 6)), 2
+        state = rng.integers(0, 3, nc)  # open, at rest, pressed
+        u, r = np.zeros((nc, d)), np.zeros((nc, d))
+        u[state == 0, 0] = 1
+        r[state == 2, 0] = 0.5
+        r[state == 2, 1] = 0.5 * mu * rng.integers(-1, 2, int((state == 2).sum())) / 2
+        n = int(rng.integers(1, 2 * nc + 1))
+        H = rng.integers(-4, 5, (n, d * nc)) / 2
+        mass = np.exp2(rng.integers(-10, 11, n))
+        mus = np.full(nc, mu)
+        if kind == "local":
+            W = H.T / mass @ H
+            problem: Any = fclib.LocalProblem(spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), mu=mus)
+        else:
+            v = rng.integers(-2, 3, n) / 2
+            problem = fclib.GlobalProblem(
+                spacedim=d,
+                M=np.diag(mass),
+                H=H,
+                f=mass * v - H @ r.ravel(),
+                w=u.ravel() - H.T @ v,
+                mu=mus,
+            )
+        found = analysis.reference(problem)
+        assert found.solution is not None
+        assert found.solution.u is not None
+        if np.linalg.norm(found.solution.u - u.ravel()) > 1e-12 * max(
+            1.0, float(np.linalg.norm(u))
+        ):
+            continue  # another solution
+        size = float(np.linalg.norm(r))
+        if found.reaction == "unique":
+            np.testing.assert_allclose(found.solution.r, r.ravel(), atol=1e-6 * max(size, 1e-3))
+        if found.reaction == "minimum norm":
+            assert np.linalg.norm(found.solution.r) <= size * (1 + 1e-6) + 1e-12
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"target": "x"},
+        {"target": None},
+        {"target": float("nan")},
+        {"target": 0},
+        {"target": -1e-9},
+        {"target": float("inf")},
+        {"time_limit": None},
+        {"time_limit": "x"},
+        {"time_limit": 0},
+        {"time_limit": float("nan")},
+    ],
+)
+def test_wrong_numbers_are_named(wrong: dict[str, Any]) -> None:
+    problem = twins()
+    (name,) = wrong
+    with pytest.raises(fclib.OptionError, match=f"{name}: "):
+        analysis.reference(problem, **wrong)
+    if name == "time_limit":
+        with pytest.raises(fclib.OptionError, match="time_limit: "):
+            analysis.analyze(problem, **wrong)
+        if wrong[name] != 0:  # then it ends at once
+            with pytest.raises(fclib.OptionError, match="time_limit: "):
+                analysis.enumerate_solutions(problem, **wrong)
+    elif wrong[name] not in (0, -1e-9):
+        with pytest.raises(fclib.OptionError, match="tol: "):
+            analysis.analyze(problem, tol=wrong[name])
+
+
+@pytest.mark.parametrize("call", ["reference", "analyze", "enumerate_solutions"])
+@pytest.mark.parametrize("problem", [None, 3, "a file.hdf5", fclib.Solution(r=[1.0, 0])])
+def test_what_is_no_problem_is_named(call: str, problem: Any) -> None:
+    with pytest.raises(fclib.ProblemError, match=r"problem: a .* is none of"):
+        getattr(analysis, call)(problem)
 
 
 # ---- contacts and energy

@@ -27,9 +27,16 @@ EPS = float(np.finfo(float).eps)
 
 
 def check_arguments(
-    problem: object, *, time_limit: object, tol: object = 0.0, target: object = 1.0
+    problem: object,
+    *,
+    time_limit: object,
+    tol: object = 0.0,
+    target: object = 1.0,
+    no_time: bool = False,
 ) -> None:
     """The errors of `fclib.solve`, before anything is computed.
+
+    With `no_time`, a time limit of 0 is one.
 
     Raises:
         fclib.ProblemError: the problem is none.
@@ -41,7 +48,8 @@ def check_arguments(
             raise _core.OptionError(f"{name}: {value!r} is not a number")
     if not isinstance(time_limit, Real):
         raise _core.OptionError(f"time_limit: {time_limit!r} is not a number of seconds")
-    _solve.check_limits(float(tol), float(time_limit))  # type: ignore[arg-type]
+    seconds = None if no_time and time_limit == 0 else float(time_limit)
+    _solve.check_limits(float(tol), seconds)  # type: ignore[arg-type]
     if not 0 < float(target) < np.inf:  # type: ignore[arg-type]
         raise _core.OptionError(f"target: {target} is not a positive finite number")
 

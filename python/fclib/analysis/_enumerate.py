@@ -525,9 +525,9 @@ def enumerate_solutions(problem: _solve.Problem, *, time_limit: float = 5.0) -> 
 
     Raises:
         fclib.ProblemError: the data is not valid.
-        fclib.OptionError: time_limit is no positive number.
+        fclib.OptionError: time_limit is no number, or negative.
     """
-    check_arguments(problem, time_limit=time_limit)
+    check_arguments(problem, time_limit=time_limit, no_time=True)
     problem.validate()
     if why := qualifies(problem):
         return Enumeration((), why)

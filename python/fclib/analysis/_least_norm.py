@@ -29,6 +29,8 @@ UNIQUE, LEAST, SEVERAL, UNDECIDED = "unique", "minimum norm", "one of several", 
 CLOSE = 10.0  # times the error: velocities below this are zero in a second try
 OWN = 1e-6  # in the largest r_N: a reaction above this says in which direction it resists
 SAME = 1e-6  # relative difference of two reactions, or norms, that are not told apart
+ROUNDED = 100  # times EPS: a smaller entry of an orthonormal basis is rounding
+FLAT = 1e-8  # a gradient below this is no direction
 PASSES = 6  # conic programs, each scaled by the norm that the last one found
 
 
@@ -318,7 +320,9 @@ def _program(
     z = kernel.T @ (np.array(answer.x) - start)
     if not np.isfinite(z).all():
         return None, False
-    c = _inside(faces, start, kernel, z)
+    # what the kernel moves only by rounding keeps its value
+    held = np.linalg.norm(kernel, axis=1) <= ROUNDED * EPS
+    c = _inside(faces, start, np.where(held[:, None], 0.0, kernel), z)
     value = float(c @ c) / 2
     return c, bool(value - answer.obj_val_dual <= SAME * max(value, SAME))
 
@@ -347,9 +351,12 @@ def _inside(faces: Faces, start: Array, kernel: Array, z: Array) -> Array:
             gradients.append(kernel[k])
         for cones in faces.cones:
             _violations(faces, cones, x, kernel, gaps, gradients)
-        if not gaps:
+        # what no step in the kernel can mend is the solution's own
+        mended = np.linalg.norm(np.array(gradients), axis=-1) > FLAT if gaps else np.zeros(0, bool)
+        if not mended.any():
             break
-        z = z - np.linalg.lstsq(np.array(gradients), np.array(gaps), rcond=1e-8)[0]
+        steps, rest = np.array(gradients)[mended], np.array(gaps)[mended]
+        z = z - np.linalg.lstsq(steps, rest, rcond=FLAT)[0]
     return c
 
 

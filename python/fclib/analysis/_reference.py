@@ -26,7 +26,7 @@ import numpy as np
 from fclib import _core, _registry, _solve
 from fclib.analysis._analyze import velocity_is_unique
 from fclib.analysis._contacts import completed
-from fclib.analysis._data import Array, Data, check_arguments
+from fclib.analysis._data import EPS, Array, Data, check_arguments
 from fclib.analysis._least_norm import least_norm
 
 TARGET = 1e-12  # for the merit
@@ -34,6 +34,7 @@ CONFIRMED = 1e2  # the confirming error may be this many times the target
 AGREE = 1e-8  # distance of the velocities, relative to max(||u||, ||q||)
 DIGITS = 3  # digits of the reactions from which a second try starts
 CLEAR = 1e2  # a start must miss the confirming error by this factor
+ROUNDED = 16  # times EPS ||w||: a velocity of contacts that may be rounding
 DISTURBED = 2.0**-10  # size of the disturbance, relative to the reactions
 # Of two solutions with an error e, min(r, u) is at most about the root of e at their mean if both
 # approximate one solution of a monotone problem. The mean of others has an error of more than so
@@ -271,6 +272,9 @@ def _confirm(
     """Runs of other families until one agrees, and the velocities of other solutions."""
     _, u = completed(data, solution)
     speed = max(float(np.linalg.norm(u)), data.speed)
+    # a difference by rounding is none; velocities of bodies may be large where those of contacts
+    # cancel
+    rounding = ROUNDED * EPS * float(np.linalg.norm(getattr(data.problem, "w", np.zeros(0))))
     tried: list[Confirmation] = [run]
     others: list[float] = []
     for start, guess in _starts(data, solution, CLEAR * CONFIRMED * target):
@@ -284,7 +288,8 @@ def _confirm(
                 result = _solve.solve(data.problem, name, target, time_limit=limit, guess=guess)
             except _core.UnsuitableError:
                 continue
-            difference = float(np.linalg.norm(completed(data, result.solution)[1] - u)) / speed
+            apart = float(np.linalg.norm(completed(data, result.solution)[1] - u))
+            difference = max(0.0, apart - rounding) / speed
             found = Confirmation(
                 name,
                 (info.family,),
@@ -312,8 +317,9 @@ def _confirm(
                 f" velocity (the nearest differs by {min(away):.1e})"
             )
             return _Check(tuple(tried), tuple(others), doubt)
-    nearest = min((one.difference for one in tried[1:]), default=float("nan"))
-    doubt = f"no unrelated algorithm agrees (the nearest differs by {nearest:.1e})"
+    doubt = "no start is far enough from the solution for an unrelated algorithm to confirm it"
+    if differences := [one.difference for one in tried[1:]]:
+        doubt = f"no unrelated algorithm agrees (the nearest differs by {min(differences):.1e})"
     return _Check(tuple(tried), tuple(others), doubt)
 
 
@@ -338,7 +344,10 @@ def _starts(
     if misses(np.zeros(data.problem.m)):
         starts.append(("zero", None))
     near = [("rounded", _rounded(solution.r))]
-    near += [("disturbed", _disturbed(data, solution.r, sign)) for sign in (1, -1)]
+    usual = max(float(abs(solution.r).max()), data.speed / data.stiffness)
+    # if ||q|| is rounding, that is no size; 1 m/s is one
+    for size in (usual, -usual, 1 / data.stiffness):
+        near.append(("disturbed", _disturbed(data, solution.r, DISTURBED * size)))
     found = [(name, r) for name, r in near if misses(r)]
     return starts + [(name, _core.Solution(r=r, l=solution.l)) for name, r in found[:1]]
 
@@ -347,11 +356,10 @@ def _rounded(r: Array) -> Array:
     return np.array([float(f"{value:.{DIGITS - 1}e}") for value in r])
 
 
-def _disturbed(data: Data, r: Array, sign: int) -> Array:
+def _disturbed(data: Data, r: Array, size: float) -> Array:
     """Reactions with other normal parts, each changed by another amount."""
-    usual = max(float(abs(r).max()), data.speed / data.stiffness)
     found = r.copy()
-    found[:: data.d] += sign * DISTURBED * usual * np.linspace(1, 2, data.problem.nc)
+    found[:: data.d] += size * np.linspace(1, 2, data.problem.nc)
     return found
 
 

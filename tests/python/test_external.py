@@ -156,13 +156,14 @@ def test_defaults_that_no_user_can_mend_are_refused_at_once() -> None:
 
     def text(p: Any, r: Any, monitor: Any, *, count: int = "3") -> None: ...  # type: ignore[assignment]
 
-    for function, said in {
+    refused: dict[Any, str] = {
         own: "option merit: is a name that fclib.solve has itself",
         far: "option step: its default 2.0 is not between -inf and 1",
         bounds: "option step: its default 2.0 is not between nan and inf",
         kind: "option kind: its default 'c' is none of a, b",
         text: "option count: its default '3' is no int",
-    }.items():
+    }
+    for function, said in refused.items():
         with pytest.raises(TypeError, match=said):
             fclib.solver("t-refused")(function)
 

@@ -277,6 +277,7 @@ def _confirm(
     rounding = ROUNDED * EPS * float(np.linalg.norm(getattr(data.problem, "w", np.zeros(0))))
     tried: list[Confirmation] = [run]
     others: list[float] = []
+    unexplained: list[float] = []  # differences of solutions that may be the same one, or not
     for start, guess in _starts(data, solution, CLEAR * CONFIRMED * target):
         # do not wait for a solution that does not come soon from zero
         limit = min(time_limit, 2.0) if start == "zero" else time_limit
@@ -304,17 +305,13 @@ def _confirm(
             worked = found.iterations > 0 or not result.solution.r.any()
             if worked and found.error <= CONFIRMED * target and difference <= AGREE:
                 return _Check(tuple(tried), tuple(others))
-            if (
-                found.error <= target
-                and difference > AGREE
-                and _another(data, solution, result.solution, target)
-            ):
-                others.append(difference)
-        away = [one.difference for one in tried[1:] if one.error <= target]
-        if start == "zero" and away:
+            if found.error <= target and difference > AGREE:
+                shown = _another(data, solution, result.solution, target)
+                (others if shown else unexplained).append(difference)
+        if start == "zero" and unexplained:
             doubt = (
                 "each unrelated algorithm that reaches a solution from zero ends at another"
-                f" velocity (the nearest differs by {min(away):.1e})"
+                f" velocity (the nearest differs by {min(unexplained):.1e})"
             )
             return _Check(tuple(tried), tuple(others), doubt)
     doubt = "no start is far enough from the solution for an unrelated algorithm to confirm it"

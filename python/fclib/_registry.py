@@ -39,6 +39,7 @@ RESERVED = {
     "history",
     "merit",
 }
+REAL = "expected real numbers"
 OPTION_TYPES = {bool: "bool", int: "int", float: "float"}
 
 
@@ -189,10 +190,13 @@ def make_solver(
 
 def _reactions_of(answer: Any) -> npt.NDArray[np.float64]:
     """What a function returned, as numbers: no part of it is dropped."""
-    array = np.asarray(answer)
+    try:
+        array = np.asarray(answer)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"returned what is no array ({error}), {REAL}") from error
     if np.ma.is_masked(answer) or array.dtype.kind not in "fiub":
         kind = "a masked array" if np.ma.is_masked(answer) else f"an array of {array.dtype}"
-        raise TypeError(f"returned {kind}, expected real numbers")
+        raise TypeError(f"returned {kind}, {REAL}")
     return array.astype(np.float64, copy=False)
 
 

@@ -130,9 +130,9 @@ def test_nothing_of_an_answer_is_dropped(answer: Callable[[Any], Any], said: str
     def give(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
         return answer(r)
 
-    fclib.solver("t-answers")(give)
-    with pytest.raises(fclib.SolverError, match=f"t-answers: {said}"):
-        fclib.solve(problem_of(), "t-answers")
+    fclib.solver("t-dropped")(give)
+    with pytest.raises(fclib.SolverError, match=f"t-dropped: {said}"):
+        fclib.solve(problem_of(), "t-dropped")
 
 
 @pytest.mark.parametrize("name", ["", " ", None, 7])

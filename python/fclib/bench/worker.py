@@ -52,7 +52,7 @@ GO = b"go"
 # statuses that solvers outside of the core report by fclib.SolverError
 BY_SIGNAL = re.compile(r"(?:was ended by signal|ended with signal) (\d+)")
 NOTHING = ("made no output", "wrote no /solution")
-GARBAGE = ("its output", "its solution has", "returned an array of shape")
+GARBAGE = ("its output", "its solution has", "returned an array of shape", _registry.REAL)
 
 
 def bytes_of(problem: _solve.Problem) -> int:
@@ -285,13 +285,8 @@ def classify(error: Exception, foreign: bool) -> str:
         return of_signal(int(found[1]), outside=not foreign)
     if any(words in text for words in NOTHING):
         return "nothing"
-    if isinstance(error, _registry.SolverError):
-        if any(words in text for words in GARBAGE):
-            return "garbage"
-        # the conversion of the answer into numbers raised, not the solver
-        trace = causes[-1].__traceback__
-        if isinstance(causes[-1], (TypeError, ValueError)) and trace and not trace.tb_next:
-            return "garbage"
+    if isinstance(error, _registry.SolverError) and any(words in text for words in GARBAGE):
+        return "garbage"
     return "error"
 
 

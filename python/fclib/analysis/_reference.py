@@ -1,14 +1,14 @@
 """Reference solutions: to the limit of double precision, by two unrelated algorithms.
 
 The first algorithm gives the solution, the second one confirms it: it shares no iteration with the
-first, and its velocity must agree. It starts from zero. If no run from zero reaches a solution, it
+first, and its velocity must agree. It starts from zero. If no run from zero reaches this solution, it
 starts again from the first's reactions, rounded to three digits. If this start is itself a
 solution, the reactions are disturbed: a run that has nothing to do confirms nothing.
 
-If all runs from zero that reach a solution end at another velocity, the solution is not certified.
-Frictional problems may have several solutions. Or the problem is so close to singular that an error
-within the target does not tell the velocity. Such a velocity is that of another solution only if
-their mean is clearly no solution, and if no theorem says that there is one velocity.
+A run from zero may also end at another velocity, as frictional problems may have several solutions.
+It is that of another solution only if their mean is clearly no solution, and if no theorem says that
+there is one velocity. Otherwise the problem may be so close to singular that an error within the
+target does not tell the velocity: then the solution is not certified.
 
 If the reactions of a velocity are not unique, the solution has those of least norm
 (`_least_norm.py`).

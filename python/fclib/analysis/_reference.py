@@ -5,9 +5,9 @@ first, and its velocity must agree. It starts from zero. If no run from zero rea
 starts again from the first's reactions, rounded to three digits. If this start is itself a
 solution, the reactions are disturbed: a run that has nothing to do confirms nothing.
 
-A run from zero may also end at another velocity, as frictional problems may have several solutions.
-It is that of another solution only if their mean is clearly no solution, and if no theorem says that
-there is one velocity. Otherwise the problem may be so close to singular that an error within the
+A run from zero may also end at another velocity, as frictional problems may have several
+solutions. It is that of another solution only if their mean is clearly no solution, and if no
+theorem says that there is one velocity. Otherwise the problem may be so close to singular that an error within the
 target does not tell the velocity: then the solution is not certified.
 
 If the reactions of a velocity are not unique, the solution has those of least norm

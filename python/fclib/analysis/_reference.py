@@ -1,8 +1,8 @@
 """Reference solutions: to the limit of double precision, by two unrelated algorithms.
 
 The first algorithm gives the solution, the second one confirms it: it shares no iteration with the
-first, and its velocity must agree. It starts from zero. If no run from zero reaches this solution, it
-starts again from the first's reactions, rounded to three digits. If this start is itself a
+first, and its velocity must agree. It starts from zero. If no run from zero reaches this solution,
+it starts again from the first's reactions, rounded to three digits. If this start is itself a
 solution, the reactions are disturbed: a run that has nothing to do confirms nothing.
 
 A run from zero may also end at another velocity, as frictional problems may have several

@@ -7,8 +7,8 @@ solution, the reactions are disturbed: a run that has nothing to do confirms not
 
 A run from zero may also end at another velocity, as frictional problems may have several
 solutions. It is that of another solution only if their mean is clearly no solution, and if no
-theorem says that there is one velocity. Otherwise the problem may be so close to singular that an error within the
-target does not tell the velocity: then the solution is not certified.
+theorem says that there is one velocity. Otherwise the problem may be so close to singular that an
+error within the target does not tell the velocity: then the solution is not certified.
 
 If the reactions of a velocity are not unique, the solution has those of least norm
 (`_least_norm.py`).

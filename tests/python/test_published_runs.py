@@ -21,6 +21,7 @@ from fclib.bench.job import Job, Record
 pytest.importorskip("pyarrow")
 
 from fclib import results
+from fclib.results.beside import replaced
 from helpers_cli import invoke
 from workshop.tables import two_machines
 
@@ -43,14 +44,20 @@ def facts(node: str, speed: float | None) -> dict[str, Any]:
     return own
 
 
-def store(path: Path, own: dict[str, Any], solvers: list[str], cpu: float = 0.01) -> Path:
-    """A store of runs that were not run."""
+def store(
+    path: Path, own: dict[str, Any], solvers: list[str], cpu: float = 0.01, version: str = ""
+) -> Path:
+    """A store of runs that were not run; those of a named version are of a later day."""
+
+    def of_version(job: Job) -> Job:
+        return replace(job, solver=replace(job.solver, version=version)) if version else job
+
     campaign = bench.Campaign.of({**PLAN, "solvers": solvers})
     with bench.Store(path) as opened:
         number = opened.begin("small", "text", 1, 0, own["node"])
         runs: list[tuple[Job, Record]] = [
             (
-                job,
+                of_version(job),
                 Record(
                     "converged",
                     "",
@@ -61,7 +68,7 @@ def store(path: Path, own: dict[str, Any], solvers: list[str], cpu: float = 0.01
                     merits={"error": job.tol / 2, "natural": job.tol / 3},
                     machine=own,
                     history=[(0, 1.0, 0.0, ""), (7, job.tol / 2, cpu, "newton")],
-                    started=1.7e9,
+                    started=1.8e9 if version else 1.7e9,
                 ),
             )
             for job in campaign.plan()
@@ -450,6 +457,42 @@ def test_published_runs_alone_are_on_one_scale(tmp_path: Path) -> None:
     }
     with pytest.raises(results.ShardError, match="no runs"), results.alone([]):
         pass
+
+
+def test_an_older_version_is_left_out_if_a_newer_one_has_run_the_same() -> None:
+    def rows(solver: str, version: str, day: float, count: int, limit: float = 10.0) -> list[Any]:
+        same = {"merit": "both", "start": "cold", "sequence": "", "step": 0, "threads": 1}
+        own = {"solver": solver, "options": "{}", "version": version, "started": day}
+        return [
+            {**same, **own, "hash": str(k), "tol": 1e-8, "time_limit": limit} for k in range(count)
+        ]
+
+    old = rows("auto", "1", 1.0, 3)
+    others = rows("nsgs", "1", 5.0, 9) + rows("auto", "other", 2.0, 9)[5:]
+    assert replaced(old + others) == set()
+    assert replaced(old + others + rows("auto", "2", 3.0, 3)) == {("auto", "{}", "1")}
+    assert replaced(old + rows("auto", "2", 3.0, 2)) == set()  # one run is missing
+    assert replaced(old + rows("auto", "2", 3.0, 3, limit=1.0)) == set()
+    assert replaced(old + rows("auto", "2", 0.5, 4)) == set()  # the older one has more
+    assert replaced(old + rows("auto", "2", 3.0, 3) + rows("auto", "3", 4.0, 4)) == {
+        ("auto", "{}", "1"),
+        ("auto", "{}", "2"),
+    }
+
+
+def test_a_comparison_shows_the_newest_version_that_has_run_all(tmp_path: Path) -> None:
+    part = packed(tmp_path)
+    newer = store(tmp_path / "newer.sqlite", facts("theirs", 2.0), ["nsgs"], version="newer")
+    with bench.Store(newer) as opened:
+        later = results.pack(opened, tmp_path / "parts", "small", "fast")
+    assert later is not None
+    with results.alone([part, later]) as found, bench.Store(found.path) as opened:
+        shown = {(row["solver"], row["version"] == "newer") for row in opened.table()}
+    assert shown == {("nsgs", True), ("apgd", False)}
+    mine = store(tmp_path / "mine.sqlite", facts("here", 1.0), ["ppa-nsn"])
+    with results.beside(mine, [part, later]) as found, bench.Store(found.path) as opened:
+        shown = {(row["solver"], row["version"] == "newer") for row in opened.table()}
+    assert shown == {("nsgs", True), ("apgd", False), ("ppa-nsn", False)}
 
 
 def test_a_solver_of_a_file_is_run_beside_published_ones(

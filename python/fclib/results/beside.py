@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from typing import Any
 from fclib import _core
 from fclib.bench.calibration import Calibration, Ratio, calibration_in, ratio_of
 from fclib.bench.store import Store
-from fclib.results.shards import ShardError, look, rows_of
+from fclib.results.shards import Shard, ShardError, look, rows_of
 
 NONE = (math.inf, math.inf)  # the limits of a kind of runs that a store lacks
 TIMES = ("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s")
@@ -47,7 +47,7 @@ def beside(
     The published runs of a problem at a tolerance are taken if the store has such a run, and its
     limit is no larger than theirs. A time on another machine becomes the time on this one: it is
     multiplied by the ratio of the two calibrations. The limit is that of the store: a run that
-    would take longer here has failed.
+    would take longer here has failed. `replaced` versions are left out.
 
     Args:
         mine: the store.
@@ -68,14 +68,19 @@ def beside(
             here = calibration_in(facts)
             ratios: dict[str, Ratio] = {}
             taken = 0
-            for part in parts:
-                machines = look(part).machines
+            looked = [look(part) for part in parts]
+
+            def counts(row: Mapping[str, Any]) -> bool:
+                return bool(row["time_limit"] >= limits.get(kind_of(row), NONE)[0])
+
+            older = replaced(filter(counts, _keys_of(looked)))
+            for part in looked:
                 if scale:
-                    ratios |= _ratios(here, machines, part)
+                    ratios |= _ratios(here, part.machines, part.path)
                 rows = (
                     _scaled(row, ratios.get(row["node"]), node, limits[kind_of(row)])
-                    for row in rows_of(part)
-                    if row["time_limit"] >= limits.get(kind_of(row), NONE)[0]
+                    for row in rows_of(part.path)
+                    if counts(row) and version_of(row) not in older
                 )
                 taken += joined.add_rows(rows, {node: facts})
         if not taken:
@@ -91,6 +96,7 @@ def alone(parts: Iterable[Path]) -> Iterator[Joined]:
     """A temporary store with all published runs, their times on the scale of one machine.
 
     This machine is the one with most runs, and its name is that of the first of the parts on ties.
+    `replaced` versions are left out.
 
     Raises:
         BesideError: there are several machines, and one of them was not calibrated.
@@ -107,6 +113,7 @@ def alone(parts: Iterable[Path]) -> Iterator[Joined]:
     for one in found:
         others = {name: own for name, own in one.machines.items() if name != node}
         ratios |= _ratios(calibration_in(facts), others, one.path)
+    older = replaced(_keys_of(found))
     with TemporaryDirectory(prefix="fclib-results-") as temporary:
         path = Path(temporary) / "published.sqlite"
         with Store(path) as joined:
@@ -114,15 +121,54 @@ def alone(parts: Iterable[Path]) -> Iterator[Joined]:
                 _scaled(row, ratios.get(row["node"]), node, (row["time_limit"], row["wall_limit"]))
                 for one in found
                 for row in rows_of(one.path)
+                if version_of(row) not in older
             )
             taken = joined.add_rows(rows, {node: facts})
         yield Joined(path, taken, ratios)
 
 
+KIND = ("hash", "tol", "merit", "start", "sequence", "step", "threads")
+OWN = ("solver", "options", "version")
+
+
 def kind_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
     """What two runs have in common that may be compared."""
-    names = ("hash", "tol", "merit", "start", "sequence", "step", "threads")
-    return tuple(row[name] for name in names)
+    return tuple(row[name] for name in KIND)
+
+
+def version_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """The solver of a run, its options and its version."""
+    return tuple(row[name] for name in OWN)
+
+
+def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
+    """The versions of solvers that a comparison leaves out, as `version_of` names them.
+
+    A later version of the solver, with the same options, has run the same problems to the same
+    tolerances, under no smaller limits. If it lacks one of these runs, both versions are compared.
+    """
+    limits: dict[tuple[Any, ...], dict[tuple[Any, ...], float]] = defaultdict(dict)
+    last: dict[tuple[Any, ...], float] = defaultdict(float)
+    for row in rows:
+        own, kind = limits[version_of(row)], kind_of(row)
+        own[kind] = max(row["time_limit"], own.get(kind, 0.0))
+        last[version_of(row)] = max(row["started"] or 0.0, last[version_of(row)])
+    return {
+        old
+        for old, theirs in limits.items()
+        if any(
+            new[:-1] == old[:-1]
+            and last[new] > last[old]
+            and all(own.get(kind, 0.0) >= limit for kind, limit in theirs.items())
+            for new, own in limits.items()
+        )
+    }
+
+
+def _keys_of(parts: Iterable[Shard]) -> Iterator[dict[str, Any]]:
+    """What `replaced` reads of the runs of parts."""
+    names = (*KIND, *OWN, "time_limit", "started")
+    return (row for part in parts for row in rows_of(part.path, names))
 
 
 def _wanted(

@@ -18,6 +18,7 @@ pytest.importorskip("pyarrow")
 from fclib import results
 from fclib.collections import set_index
 from fclib.collections.set_index import Choice
+from fclib.results import boards
 from helpers_cli import invoke
 from workshop.tables import _results, published
 
@@ -161,36 +162,33 @@ def test_a_chosen_set_has_the_runs_that_chose_it(
     own = [Choice("Chain", {}, 0, k, k, digest) for k, digest in enumerate(digests)]
     monkeypatch.setattr(set_index, "choices", lambda name: own if name == "standard" else ())
     parts = results.shards(tmp_path / "parts")
-    sources = published.sources(published.by_name(parts))
+    sources = boards.sources(boards.by_name(parts))
     assert sources == {
         "standard": [part for part in parts if part.name != "matrix-peers"],
         "standard-peers": parts,
     }
     parts = sources["standard"]
-    with results.alone([part.path for part in sources["standard-peers"]]) as joined:
-        beside = published.set_of("standard-peers", sources["standard-peers"], joined)
+    beside = published.set_of("standard-peers", sources["standard-peers"])
     assert beside is not None  # of the set, what the part has
     assert set(beside.every.solvers) == {"nsgs", "apgd", "nsn-ac", "psor", "admm"}
     assert [row["problems"] for row in published.matrix_rows(beside, 1e-8)] == [1, 1]
-    with results.alone([part.path for part in parts]) as joined:
-        one = published.set_of("standard", parts, joined)
-        none = published.set_of("hard", parts, joined)
-    assert none is None
+    one = published.set_of("standard", parts)
+    assert published.set_of("hard", parts) is None
     assert one is not None
     assert set(one.every.solvers) == {"nsgs", "apgd", "nsn-ac", "psor"}
     rows = published.matrix_rows(one, 1e-8)
     assert [(row["family"], row["problems"]) for row in rows] == [("Chain", 3), ("all", 3)]
     assert rows[0]["psor"] <= 3
     # parts of its own name come beside these; a run at another limit does not
-    found = published.sources({"other": parts, "standard": parts[:1], "candidates": parts[1:]})
+    found = boards.sources({"other": parts, "standard": parts[:1], "candidates": parts[1:]})
     assert {name: len(own) for name, own in found.items()} == {"standard": 2, "other": 2}
     short = {**PLAN, "name": "standard", "solvers": ["bb"], "time_limit": 7.0}
     bench.run_campaign(bench.Campaign.of(short), tmp_path / "standard.sqlite")
     with bench.Store(tmp_path / "standard.sqlite") as opened:
         results.pack(opened, tmp_path / "parts", "standard", "fast")
-    parts = published.sources(published.by_name(results.shards(tmp_path / "parts")))["standard"]
-    with results.alone([part.path for part in parts]) as joined:
-        one = published.set_of("standard", parts, joined)
+    parts = boards.sources(boards.by_name(results.shards(tmp_path / "parts")))["standard"]
+    assert {row["set"] for row in results.leaders(parts)} == {"standard"}
+    one = published.set_of("standard", parts)
     assert one is not None
     assert "bb" not in one.every.solvers
 

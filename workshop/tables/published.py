@@ -5,7 +5,7 @@
 
 It runs nothing. It reads the parts in results/ and writes docs/results/published-*.csv,
 docs/images/published-*.png and docs/published-results.md, which quotes them. A set is the name of
-its parts, or chosen from such runs (LISTS). What nothing is published of is left out.
+its parts, or chosen from such runs. What nothing is published of is left out.
 
 --paper has the curves of the comparison of 2018, as they were read from its figures: set,
 tolerance, limit_s, solver, tau, share. They are quoted beside ours, set by set. --catalog is a
@@ -20,8 +20,7 @@ import math
 import textwrap
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -32,10 +31,10 @@ from fclib import collections, results, scenes
 from fclib._verdicts import is_solved
 from fclib.bench import comparison, plots, profiles
 from fclib.bench.calibration import calibration_in
-from fclib.bench.comparison import Array, Costs, numbers_in, odds, words_in
-from fclib.bench.store import Store
+from fclib.bench.comparison import Array, Costs, odds, words_in
 from fclib.bench.table import Table
 from fclib.collections import set_index
+from fclib.results.boards import CHOSEN_FROM, PART_OF, at_one_limit, by_name, digests_of, sources
 from workshop.tables import _results
 
 Row: TypeAlias = dict[str, Any]
@@ -60,16 +59,7 @@ OWN: Final = {
     "ACLM-NSGS-FP-VI": "siconos:aclmfp",
 }
 BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
-# sets that were chosen from runs, and the parts that have these, beside parts of their own name
-LISTS: Final = {
-    "standard": ("candidates", "matrix"),
-    "standard-peers": ("candidates", "matrix", "matrix-peers"),
-    "hard": ("candidates-long",),
-    "open": ("candidates-long",),
-}
-# what is no set by its name: the problems of a set that a part has
-PART_OF: Final = {"standard-peers": ("standard", "matrix-peers")}
-CHOSEN: Final = LISTS.keys() - PART_OF.keys()
+CHOSEN: Final = CHOSEN_FROM.keys() - PART_OF.keys()
 # how the problems of a set were taken, if that favours a solver
 TAKEN: Final = {
     "candidates-long": "The sets `standard`, `hard` and `open` [were chosen]"
@@ -124,62 +114,29 @@ def main() -> None:
     groups = by_name(parts)
     facts = facts_of(own.catalog) if own.catalog else {}
     page: list[str] = []
-    with ExitStack() as stack:
-        sets = []
-        for name, shards in sources(groups).items():
-            joined = stack.enter_context(results.alone([shard.path for shard in shards]))
-            if name == SEQUENCES:
+    sets = []
+    for name, shards in sources(groups).items():
+        if name == SEQUENCES:
+            with results.alone([shard.path for shard in shards]) as joined:
                 rows = profiles.load(joined.path, start=None)
                 page += table("published-warm", warm(joined.path, rows), "Warm against cold", "")
-            elif one := set_of(name, shards, joined):
-                sets.append(one)
-        page = [*of_sets(sets, groups, facts), *(["## Warm or cold?", "", *page] if page else [])]
-        if own.paper:
-            page += [part for one in sets if one.name == PAPER for part in of_paper(one, own.paper)]
+        elif one := set_of(name, shards):
+            sets.append(one)
+    page = [*of_sets(sets, groups, facts), *(["## Warm or cold?", "", *page] if page else [])]
+    if own.paper:
+        page += [part for one in sets if one.name == PAPER for part in of_paper(one, own.paper)]
     PAGE.write_text("\n".join([*HEAD, *page]).rstrip() + "\n", encoding="utf-8")
     print(PAGE)
 
 
-def by_name(parts: Iterable[results.Shard]) -> dict[str, list[results.Shard]]:
-    """The parts of each name."""
-    groups: dict[str, list[results.Shard]] = defaultdict(list)
-    for part in parts:
-        groups[part.name].append(part)
-    return groups
-
-
-def sources(groups: Mapping[str, Sequence[results.Shard]]) -> dict[str, list[results.Shard]]:
-    """The sets that the parts have runs of, each with its parts."""
-    found = {
-        name: [part for source in (*names, name) for part in groups.get(source, ())]
-        for name, names in LISTS.items()
-    }
-    used = {source for names in LISTS.values() for source in names}
-    found |= {name: list(own) for name, own in groups.items() if name not in used | found.keys()}
-    order = (*LISTS, *sorted(found.keys() - LISTS.keys()))
-    there = {n for n in order if found.get(n) and (n not in PART_OF or PART_OF[n][1] in groups)}
-    return {name: found[name] for name in order if name in there}
-
-
-def set_of(name: str, shards: Sequence[results.Shard], joined: results.Joined) -> Set | None:
+def set_of(name: str, shards: Sequence[results.Shard]) -> Set | None:
     """The runs of a set, gathered; None if there is none."""
-    # only their problems, so that a solver has no version in its name if others had another one
-    whole, part = PART_OF.get(name, (name, ""))
-    own = {choice.digest for choice in set_index.choices(whole)} if name in LISTS else None
-    if own is not None:
-        if part:
-            theirs = [shard.path for shard in shards if shard.name == part]
-            own &= {row["hash"] for path in theirs for row in results.rows_of(path, ("hash",))}
-        with Store(joined.path, create=False) as opened:
-            own &= set(words_in(opened.table(), "hash").present())
-        if not own:
-            return None
-    rows = profiles.load(joined.path, digests=own)
-    if name in LISTS:
-        # at one limit, that of most runs
-        limits, counts = np.unique(numbers_in(rows, "time_limit"), return_counts=True)
-        if limits.size:
-            rows = rows.where(numbers_in(rows, "time_limit") == limits[counts.argmax()])
+    own = digests_of(name, shards)
+    if not own:
+        return None
+    # only its problems, so that a solver has no version in its name if others had another one
+    with results.alone([shard.path for shard in shards], own) as joined:
+        rows = at_one_limit(name, profiles.load(joined.path))
     every = profiles.gather(rows)
     return Set(name, shards, rows, every, comparison.compared(every), str(joined))
 

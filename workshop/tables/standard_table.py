@@ -20,6 +20,7 @@ import fclib
 from fclib import results
 from fclib.bench import comparison, profiles
 from fclib.bench.comparison import numbers_in
+from fclib.results.boards import by_name, sources
 from workshop.tables import _results, published
 
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
@@ -61,12 +62,10 @@ def main() -> None:
     arguments = parser.parse_args()
 
     where = results.folder()
-    parts = published.sources(published.by_name(results.shards(where) if where else [])).get(SET)
-    if not parts:
+    parts = sources(by_name(results.shards(where) if where else [])).get(SET, [])
+    one = published.set_of(SET, parts)
+    if one is None:
         raise SystemExit(f"no runs of {SET} are published here")
-    with results.alone([part.path for part in parts]) as joined:
-        one = published.set_of(SET, parts, joined)
-    assert one is not None
     every = one.every.at(one.every.tolerances[-1])
     costs = every.shared()
     taken = Counter(

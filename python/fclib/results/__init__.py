@@ -5,6 +5,7 @@
 shards.py       a part: from a store, back into one, and checked
 beside.py       published runs beside those of a store, on the scale of its machine
 submission.py   a part that somebody submits, with solutions that are judged again
+boards.py       which parts a set has, and which of its problems
 leaders.py      the solvers of each set in their order
 
 The parts lie in the package `fclib-results`, installed beside this one, or in `results/` of a

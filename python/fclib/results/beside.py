@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,11 +92,11 @@ def beside(
 
 
 @contextmanager
-def alone(parts: Iterable[Path]) -> Iterator[Joined]:
-    """A temporary store with all published runs, their times on the scale of one machine.
+def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Iterator[Joined]:
+    """A temporary store with published runs alone, their times on the scale of one machine.
 
     This machine is the one with most runs, and its name is that of the first of the parts on ties.
-    `replaced` versions are left out.
+    `replaced` versions are left out. `digests` names the problems; without it they are all taken.
 
     Raises:
         BesideError: there are several machines, and one of them was not calibrated.
@@ -113,7 +113,11 @@ def alone(parts: Iterable[Path]) -> Iterator[Joined]:
     for one in found:
         others = {name: own for name, own in one.machines.items() if name != node}
         ratios |= _ratios(calibration_in(facts), others, one.path)
-    older = replaced(_keys_of(found))
+
+    def counts_here(row: Mapping[str, Any]) -> bool:
+        return digests is None or row["hash"] in digests
+
+    older = replaced(filter(counts_here, _keys_of(found)))
     with TemporaryDirectory(prefix="fclib-results-") as temporary:
         path = Path(temporary) / "published.sqlite"
         with Store(path) as joined:
@@ -121,7 +125,7 @@ def alone(parts: Iterable[Path]) -> Iterator[Joined]:
                 _scaled(row, ratios.get(row["node"]), node, (row["time_limit"], row["wall_limit"]))
                 for one in found
                 for row in rows_of(one.path)
-                if version_of(row) not in older
+                if counts_here(row) and version_of(row) not in older
             )
             taken = joined.add_rows(rows, {node: facts})
         yield Joined(path, taken, ratios)

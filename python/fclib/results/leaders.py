@@ -1,6 +1,6 @@
 """The leaderboard: the solvers of each set, by what they solve, with version, machine and date.
 
-A set is the name of its parts. Solvers are compared as everywhere (`bench.comparison`): on the
+`boards` says which parts a set has. Solvers are compared as everywhere (`bench.comparison`): on the
 instances that all of them have run and take, each family with the same weight. Times of several
 machines are brought to the scale of one by their calibrations.
 """
@@ -10,12 +10,12 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from fclib.bench import comparison, profiles
 from fclib.bench.comparison import in_order, numbers_in, odds, words_in
 from fclib.results.beside import alone
+from fclib.results.boards import at_one_limit, by_name, digests_of, sources
 from fclib.results.shards import Shard, rows_of
 
 WEIGH: profiles.Weigh = "families"
@@ -32,20 +32,21 @@ def leaders(parts: Sequence[Shard]) -> list[dict[str, Any]]:
         ShardError: a part cannot be read.
         ProfileError: there is nothing to compare.
     """
-    groups: dict[str, list[Path]] = defaultdict(list)
-    for part in parts:
-        groups[part.name].append(part.path)
-    return [row for name, own in sorted(groups.items()) for row in of_set(name, own)]
+    return [row for name, own in sources(by_name(parts)).items() for row in of_set(name, own)]
 
 
-def of_set(name: str, parts: Sequence[Path]) -> list[dict[str, Any]]:
+def of_set(name: str, parts: Sequence[Shard]) -> list[dict[str, Any]]:
     """The rows of a set."""
+    digests = digests_of(name, parts)
+    if not digests:
+        return []
     measured: dict[str, set[str]] = defaultdict(set)  # the machines of each solver
-    for path in parts:
-        for row in rows_of(path, ("solver", "node")):
-            measured[row["solver"]].add(row["node"])
-    with alone(parts) as joined:
-        runs = profiles.load(joined.path)
+    for part in parts:
+        for row in rows_of(part.path, ("solver", "node", "hash")):
+            if row["hash"] in digests:
+                measured[row["solver"]].add(row["node"])
+    with alone([part.path for part in parts], digests) as joined:
+        runs = at_one_limit(name, profiles.load(joined.path))
     costs = comparison.compared(profiles.gather(runs))
     solver, started = words_in(runs, "solver"), numbers_in(runs, "started")
     found = []

@@ -169,6 +169,16 @@ def test_which_problems_are_the_steps(smooth: Path) -> None:
     assert sorted({job.problem.name[-4:] for job in fewer}) == ["0000", "0001"]
 
 
+def test_a_cut_leaves_the_first_steps_warm_and_cold(smooth: Path) -> None:
+    """Also if only a share of the runs is repeated, or a budget ends the campaign."""
+    for more in ({"repeats": 2, "repeated": 0.1}, {"budget": "1h"}):
+        plan = [job for job in campaign(smooth, **more).plan() if not job.repeat]
+        places = {job.problem.hash: job.along.step for job in plan if job.along}
+        steps = [places[job.problem.hash] for job in plan]
+        assert steps == sorted(steps)
+        assert [bool(job.along) for job in plan[:4]].count(True) == 2  # of two solvers
+
+
 def test_a_step_is_another_run_where_the_steps_before_are_others(smooth: Path) -> None:
     def keys(**sequence: int) -> dict[str, str]:
         plan = campaign(smooth, solvers=["nsgs"], sequence=sequence).plan()

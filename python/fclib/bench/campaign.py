@@ -414,8 +414,10 @@ class Campaign:
 def spread(jobs: Sequence[Job]) -> list[Job]:
     """The jobs in an order whose first part has all jobs of its problems, of all families.
 
-    If there are repeats among them, each comes `LATER` than the run before it.
+    If there are repeats among them, each comes `LATER` than the run before it. The steps of a
+    sequence come in their order, as a warm run waits for the step before.
     """
+    steps = {job.problem.hash: job.along.step for job in jobs if job.along}
     families: dict[str, dict[str, dict[int, list[Job]]]] = defaultdict(
         lambda: defaultdict(lambda: defaultdict(list))
     )
@@ -424,7 +426,7 @@ def spread(jobs: Sequence[Job]) -> list[Job]:
     places = [
         ((k + 0.5) / len(own) + LATER * (repeat - min(repeats)), family, repeat, part)
         for family, own in families.items()
-        for k, repeats in enumerate(own.values())
+        for k, (_, repeats) in enumerate(sorted(own.items(), key=lambda one: steps.get(one[0], 0)))
         for repeat, part in repeats.items()
     ]
     return [job for *_, part in sorted(places, key=lambda place: place[:3]) for job in part]

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fclib
 from fclib import bench
-from fclib.bench import calibration, machine
+from fclib.bench import calibration, generated, machine
 from fclib.bench.calibration import Calibration, calibration_in, ratio_of
 from fclib.bench.job import Job, Record
 
@@ -32,6 +33,7 @@ PLAN = {
     "problems": [{"planted": {"count": 4, "contacts": 5, "seed": 1}, "family": "planted"}],
 }
 SECONDS = {f"solve {k}": 1e-3 * 2**k for k in range(6)}
+PINNED = {"nsgs": [7, 11, 14, 15], "apgd": [20, 29, 51, 58]}  # iterations
 CALIBRATED = Calibration(calibration.VERSION, "2026-01-01", 0.1, SECONDS, 0.01)
 
 
@@ -340,6 +342,22 @@ def test_facts_without_a_calibration_have_none(known: dict[str, Any]) -> None:
     assert calibration_in(known) is None
 
 
+def test_solves_whose_code_changed_do_not_count() -> None:
+    earlier = {"nsip, 3 contacts": 9.0, "nsn-ac, 3 contacts": 9.0, "nsgs, 3 contacts": 1.0}
+    found = calibration_in({"calibration": replace(CALIBRATED, seconds=earlier).record()})
+    assert found is not None
+    assert found.seconds == {"nsgs, 3 contacts": 1.0}
+
+
+def test_a_calibration_does_the_work_that_it_has_always_done() -> None:
+    """If this fails, `calibration.VERSION` must change: other work takes another time."""
+    problems = [generated.plant(size, 3, 1) for size in calibration.SIZES]
+    assert {
+        solver: [fclib.solve(one, solver, tol=calibration.TOLERANCE).iterations for one in problems]
+        for solver in calibration.SOLVERS
+    } == PINNED
+
+
 # ---- the commands
 
 
@@ -457,6 +475,27 @@ def test_published_runs_alone_are_on_one_scale(tmp_path: Path) -> None:
     }
     with pytest.raises(results.ShardError, match="no runs"), results.alone([]):
         pass
+
+
+def test_two_machines_of_one_name_are_two(tmp_path: Path) -> None:
+    """Processors give machines their published names; another one may be slower."""
+    part = packed(tmp_path, speed=2.0)
+    (tmp_path / "more").mkdir()
+    slow = store(tmp_path / "more" / "slow.sqlite", facts("slow", 4.0), ["ppa-nsn"])
+    with bench.Store(slow) as opened:
+        other = results.pack(opened, tmp_path / "parts", "small", "fast")
+    assert other is not None
+    with results.alone([part, other]) as found, bench.Store(found.path) as opened:
+        cpu = {row["solver"]: row["cpu_s"] for row in opened.table()}
+    assert [f"{name}: {ratio.mean:g}" for name, ratio in found.ratios.items()] == ["fast (2): 0.5"]
+    assert cpu == {name: pytest.approx(0.01) for name in ("nsgs", "apgd")} | {
+        "ppa-nsn": pytest.approx(0.005)
+    }
+    mine = store(tmp_path / "mine.sqlite", facts("here", 1.0), ["bb"])
+    with results.beside(mine, [part, other]) as found, bench.Store(found.path) as opened:
+        cpu = {row["solver"]: row["cpu_s"] for row in opened.table()}
+    assert sorted(found.ratios) == ["fast (1)", "fast (2)"]
+    assert (cpu["nsgs"], cpu["ppa-nsn"]) == (pytest.approx(0.005), pytest.approx(0.0025))
 
 
 def test_an_older_version_is_left_out_if_a_newer_one_has_run_the_same() -> None:

@@ -398,10 +398,11 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
     """Each run, by size; the exponent is that of the CPU time, from the size before on."""
     rows = profiles.load(store, more=("stages",))
     table: list[Row] = []
-    before: dict[str, Row] = {}
-    for row in sorted(rows, key=lambda row: (row["nc"], row["solver"], -row["tol"])):
+    before: dict[tuple[str, str], Row] = {}
+    order = ("family", "nc", "solver", "tol")
+    for row in sorted(rows, key=lambda row: tuple(row[name] for name in order)):
         solver = short(row["solver"])
-        last = before.get(solver)
+        last = before.get((row["family"], solver))
         exponent: float | str = ""
         if last is not None and row["nc"] > last["nc"]:
             times = math.log(row["total_cpu_s"] / last["total_cpu_s"])
@@ -409,6 +410,7 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
         stages = json.loads(row["stages"]) if row["stages"] else []
         table.append(
             {
+                "family": row["family"],
                 "contacts": row["nc"],
                 "solver": solver,
                 "ends": row["status"],
@@ -421,7 +423,7 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
                 "exponent": exponent,
             }
         )
-        before[solver] = row
+        before[row["family"], solver] = row
     note = f"{profiles.caption(profiles.gather(rows), rows, own_set=True)}; load is that of the"
     note += " machine as the solve began."
     return [Table(table, "Campaign {name}: each run", note)]

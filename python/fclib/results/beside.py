@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 from fclib import _core
 from fclib.bench.calibration import Calibration, Ratio, calibration_in, ratio_of
@@ -69,16 +69,17 @@ def beside(
             ratios: dict[str, Ratio] = {}
             taken = 0
             looked = [look(part) for part in parts]
+            machines = Machines(looked)
 
             def counts(row: Mapping[str, Any]) -> bool:
                 return bool(row["time_limit"] >= limits.get(kind_of(row), NONE)[0])
 
             older = replaced(filter(counts, _keys_of(looked)))
             for part in looked:
-                if scale:
-                    ratios |= _ratios(here, part.machines, part.path)
+                own_ratios = machines.ratios(part, here) if scale else {}
+                ratios |= {machines.name(part, name): found for name, found in own_ratios.items()}
                 rows = (
-                    _scaled(row, ratios.get(row["node"]), node, limits[kind_of(row)])
+                    _scaled(row, own_ratios.get(row["node"]), node, limits[kind_of(row)])
                     for row in rows_of(part.path)
                     if counts(row) and version_of(row) not in older
                 )
@@ -105,14 +106,13 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
     found = [look(part) for part in parts]
     if not any(one.runs for one in found):
         raise ShardError("no runs are published here: pip install fclib-results")
-    machines = {name: facts for one in found for name, facts in one.machines.items()}
-    counts = Counter(row["node"] for one in found for row in rows_of(one.path, ("node",)))
-    (node, _), *_ = counts.most_common(1)
-    facts = machines[node]
-    ratios: dict[str, Ratio] = {}
-    for one in found:
-        others = {name: own for name, own in one.machines.items() if name != node}
-        ratios |= _ratios(calibration_in(facts), others, one.path)
+    machines = Machines(found)
+    part, node = machines.most()
+    facts = part.machines[node]
+    ratios = {
+        one.path: machines.ratios(one, calibration_in(facts), same=machines.kind(part, node))
+        for one in found
+    }
 
     def counts_here(row: Mapping[str, Any]) -> bool:
         return digests is None or row["hash"] in digests
@@ -122,13 +122,72 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
         path = Path(temporary) / "published.sqlite"
         with Store(path) as joined:
             rows = (
-                _scaled(row, ratios.get(row["node"]), node, (row["time_limit"], row["wall_limit"]))
+                _scaled(
+                    row,
+                    ratios[one.path].get(row["node"]),
+                    node,
+                    (row["time_limit"], row["wall_limit"]),
+                )
                 for one in found
                 for row in rows_of(one.path)
                 if counts_here(row) and version_of(row) not in older
             )
             taken = joined.add_rows(rows, {node: facts})
-        yield Joined(path, taken, ratios)
+        named = {
+            machines.name(one, name): ratio
+            for one in found
+            for name, ratio in ratios[one.path].items()
+        }
+        yield Joined(path, taken, named)
+
+
+Kind: TypeAlias = tuple[str, Calibration | None]
+
+
+class Machines:
+    """The machines of some parts. Two of the same name are two if their calibrations differ.
+
+    A machine that is published by the name of its processor may be another one in each part.
+    """
+
+    def __init__(self, parts: Sequence[Shard]) -> None:
+        self._parts = parts
+        self._kinds: list[Kind] = []
+        for part in parts:
+            for name, facts in part.machines.items():
+                kind = name, calibration_in(facts)
+                if kind not in self._kinds:
+                    self._kinds.append(kind)
+
+    def kind(self, part: Shard, node: str) -> Kind:
+        """What makes it another machine."""
+        return node, calibration_in(part.machines[node])
+
+    def name(self, part: Shard, node: str) -> str:
+        """Its name, with a number if there are several of this name."""
+        same = [one for one in self._kinds if one[0] == node]
+        return node if len(same) == 1 else f"{node} ({same.index(self.kind(part, node)) + 1})"
+
+    def most(self) -> tuple[Shard, str]:
+        """The machine that has most runs: a part that has it, and its node there."""
+        counts: Counter[int] = Counter()
+        where: dict[int, tuple[Shard, str]] = {}
+        for part in self._parts:
+            for node, runs in Counter(row["node"] for row in rows_of(part.path, ("node",))).items():
+                number = self._kinds.index(self.kind(part, node))
+                counts[number] += runs
+                where.setdefault(number, (part, node))
+        ((most, _),) = counts.most_common(1)
+        return where[most]
+
+    def ratios(
+        self, part: Shard, here: Calibration | None, same: Kind | None = None
+    ) -> dict[str, Ratio]:
+        """The factor of the times of each machine of a part, but for the machine `same`."""
+        others = {
+            name: facts for name, facts in part.machines.items() if self.kind(part, name) != same
+        }
+        return _ratios(here, others, part.path)
 
 
 KIND = ("hash", "tol", "merit", "start", "sequence", "step", "threads")

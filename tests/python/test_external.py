@@ -5,6 +5,7 @@ import ctypes
 import importlib.util
 import os
 import re
+import resource
 import shutil
 import signal
 import sqlite3
@@ -675,6 +676,16 @@ def test_a_worker_that_dies_is_said_and_replaced() -> None:
     with pytest.raises(fclib.SolverError, match="signal 9"):
         fclib.solve(endless, "siconos:nsgs", time_limit=10)
     assert fclib.solve(problem_of(), "siconos:nsgs").converged
+
+
+@needs_siconos
+def test_short_solves_of_siconos_are_timed_under_a_limit_of_cpu_time() -> None:
+    """Under such a limit, as in a campaign, the clock of a process stands still between ticks."""
+    assert fclib.solve(problem_of(), "siconos:nsgs").converged
+    assert siconos._worker.process is not None
+    resource.prlimit(siconos._worker.process.pid, resource.RLIMIT_CPU, (1000, 1000))
+    for _ in range(20):
+        assert 0 < fclib.solve(problem_of(), "siconos:nsgs").cpu_s < 0.1
 
 
 @needs_siconos

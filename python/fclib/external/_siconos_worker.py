@@ -21,6 +21,9 @@ KINDS = {
     "rolling_fc3d": ("rollingFrictionContact_new_from_filename", "rolling_fc3d_driver"),
 }
 
+# [s] under a limit of CPU time Linux counts that of a process by its ticks, of 10 ms at most
+COARSE = 0.02
+
 
 def solve(sn: Any, np: Any, order: Any) -> Any:
     """One solve; the time is only that of the driver."""
@@ -33,14 +36,14 @@ def solve(sn: Any, np: Any, order: Any) -> Any:
     options.dparam[0] = order["tolerance"]
     r = np.array(order["r"], dtype=float)
     u = np.zeros(r.size)
-    start = time.process_time()
+    start = time.process_time(), time.thread_time()
     answer = driver(problem, r, u, options)
-    cpu_s = time.process_time() - start
+    whole, own = time.process_time() - start[0], time.thread_time() - start[1]
     info = answer[0] if isinstance(answer, (tuple, list)) else answer
     return {
         "info": int(info),
         "iterations": int(options.iparam[1]),
-        "cpu_s": cpu_s,
+        "cpu_s": whole if whole - own > COARSE else own,  # clearly more: other threads worked
         "r": r.tolist(),
         "u": u.tolist(),
     }

@@ -30,7 +30,7 @@ import numpy as np
 from fclib import collections, results, scenes
 from fclib._verdicts import is_solved
 from fclib.bench import comparison, plots, profiles
-from fclib.bench.calibration import calibration_in
+from fclib.bench.calibration import Calibration, calibration_in
 from fclib.bench.comparison import Array, Costs, odds, words_in
 from fclib.bench.table import Table
 from fclib.collections import set_index
@@ -69,7 +69,7 @@ TAKEN: Final = {
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
-    "programs have run so far, with their default options, beside the runs of `candidates` and "
+    "programs have run, with their default options, beside the runs of `candidates` and "
     "`matrix` on these.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
@@ -269,8 +269,11 @@ def part_row(name: str, parts: Sequence[results.Shard]) -> Row:
     begun = [c for part in parts for c in part.campaigns]
     last = max(begun, key=lambda c: c["started"] or 0, default={"planned": 0})
     spent = math.fsum(row["total_cpu_s"] or 0.0 for row in rows if row["measured"] != "history")
-    machines = {node: facts for part in parts for node, facts in part.machines.items()}
-    known = [calibration_in(facts) for facts in machines.values()]
+    machines = dict.fromkeys(node for part in parts for node in part.machines)
+    known: list[Calibration | None] = []  # machines of one name may be several
+    for part in parts:
+        found = [calibration_in(facts) for facts in part.machines.values()]
+        known += [one for one in found if one not in known]
     return {
         "set": name,
         "runs": len(rows),

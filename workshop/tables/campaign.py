@@ -46,6 +46,7 @@ STORES = _results.ROOT / "build" / "campaigns"
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
 COARSE = "doubles are too coarse"  # how the message begins if rounding ends a solve
 LARGE = 100  # contacts from which on the time is that of the solver, not that of the call
+SHORT = 50e-6  # [s] below this the call is much of the time
 SICONOS = "siconos:"
 # each solver, with its options, and the one of Siconos beside it; "" if there is none
 PAIRS = (
@@ -289,6 +290,7 @@ def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
     both = np.isfinite(ours) & np.isfinite(best)
     ratios = ours[both] / best[both]
     large = ratios[np.array([one.nc >= LARGE for one in part.instances])[both]]
+    long = ratios[best[both] >= SHORT]
     found: list[tuple[str, Any]] = [
         ("problems", len(part.instances)),
         ("solved by auto", int(np.isfinite(ours).sum())),
@@ -301,6 +303,9 @@ def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
             ("median CPU ratio", statistics.median(ratios)),
             ("worst CPU ratio", max(ratios)),
         ]
+    found.append((f"solved by both, those of Siconos in {1e6 * SHORT:g} us or more", len(long)))
+    if len(long):
+        found.append(("geometric mean of these", statistics.geometric_mean(long)))
     found.append((f"solved by both from {LARGE} contacts on", len(large)))
     if len(large):
         mean = statistics.geometric_mean(large)

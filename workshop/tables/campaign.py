@@ -400,7 +400,7 @@ def last_stage(row: Row) -> str:
 
 
 def runs(store: Path, _: argparse.Namespace) -> list[Table]:
-    """Each run, by size; the exponent is that of the CPU time, from the size before on."""
+    """Each run, by size; the exponent is that of the CPU time, if the size before is solved too."""
     rows = profiles.load(store, more=("stages",))
     table: list[Row] = []
     before: dict[tuple[str, str], Row] = {}
@@ -409,7 +409,8 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
         solver = short(row["solver"])
         last = before.get((row["family"], solver))
         exponent: float | str = ""
-        if last is not None and row["nc"] > last["nc"]:
+        both = last is not None and is_solved(row["status"]) and is_solved(last["status"])
+        if both and last is not None and row["nc"] > last["nc"]:
             times = math.log(row["total_cpu_s"] / last["total_cpu_s"])
             exponent = times / math.log(row["nc"] / last["nc"])
         stages = json.loads(row["stages"]) if row["stages"] else []

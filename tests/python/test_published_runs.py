@@ -498,25 +498,28 @@ def test_two_machines_of_one_name_are_two(tmp_path: Path) -> None:
     assert (cpu["nsgs"], cpu["ppa-nsn"]) == (pytest.approx(0.005), pytest.approx(0.0025))
 
 
-def test_an_older_version_is_left_out_if_a_newer_one_has_run_the_same() -> None:
+def test_a_version_is_left_out_if_another_one_has_run_the_same() -> None:
     def rows(solver: str, version: str, day: float, count: int, limit: float = 10.0) -> list[Any]:
         same = {"merit": "both", "start": "cold", "sequence": "", "step": 0, "threads": 1}
-        own = {"solver": solver, "options": "{}", "version": version, "started": day}
+        own = {"solver": solver, "options": "{}", "version": version, "memory_limit": 8e3}
+        own |= {"started": day}
         return [
             {**same, **own, "hash": str(k), "tol": 1e-8, "time_limit": limit} for k in range(count)
         ]
 
+    def named(*versions: str) -> set[Any]:
+        return {("auto", "{}", version, 8e3) for version in versions}
+
     old = rows("auto", "1", 1.0, 3)
     others = rows("nsgs", "1", 5.0, 9) + rows("auto", "other", 2.0, 9)[5:]
     assert replaced(old + others) == set()
-    assert replaced(old + others + rows("auto", "2", 3.0, 3)) == {("auto", "{}", "1")}
-    assert replaced(old + rows("auto", "2", 3.0, 2)) == set()  # one run is missing
+    assert replaced(old + others + rows("auto", "2", 3.0, 3)) == named("1")
+    assert replaced(old + rows("auto", "2", 3.0, 2)) == named("2")  # it has run less
+    assert replaced(old + rows("auto", "2", 3.0, 4)[1:]) == set()  # each has a run of its own
     assert replaced(old + rows("auto", "2", 3.0, 3, limit=1.0)) == set()
-    assert replaced(old + rows("auto", "2", 0.5, 4)) == set()  # the older one has more
-    assert replaced(old + rows("auto", "2", 3.0, 3) + rows("auto", "3", 4.0, 4)) == {
-        ("auto", "{}", "1"),
-        ("auto", "{}", "2"),
-    }
+    assert replaced(old + rows("auto", "2", 0.5, 4)) == named("1")
+    three = old + rows("auto", "2", 3.0, 3) + rows("auto", "3", 4.0, 4)
+    assert replaced(three) == named("1", "2")
 
 
 def test_a_comparison_shows_the_newest_version_that_has_run_all(tmp_path: Path) -> None:

@@ -74,7 +74,12 @@ def beside(
             def counts(row: Mapping[str, Any]) -> bool:
                 return bool(row["time_limit"] >= limits.get(kind_of(row), NONE)[0])
 
-            older = replaced(filter(counts, _keys_of(looked)))
+            # all of them are compared under the limits of the store
+            older = replaced(
+                row | {"time_limit": limits[kind_of(row)][0]}
+                for row in _keys_of(looked)
+                if counts(row)
+            )
             for part in looked:
                 own_ratios = machines.ratios(part, here) if scale else {}
                 ratios |= {machines.name(part, name): found for name, found in own_ratios.items()}
@@ -191,7 +196,8 @@ class Machines:
 
 
 KIND = ("hash", "tol", "merit", "start", "sequence", "step", "threads")
-OWN = ("solver", "options", "version")
+SOLVER = ("solver", "options")
+VERSION = (*SOLVER, "version", "memory_limit")
 
 
 def kind_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -200,15 +206,15 @@ def kind_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def version_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    """The solver of a run, its options and its version."""
-    return tuple(row[name] for name in OWN)
+    """The solver of a run, its options, its version and its limit of memory."""
+    return tuple(row[name] for name in VERSION)
 
 
 def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
     """The versions of solvers that a comparison leaves out, as `version_of` names them.
 
-    A later version of the solver, with the same options, has run the same problems to the same
-    tolerances, under no smaller limits. If it lacks one of these runs, both versions are compared.
+    Another version of the solver, with the same options, has run the same problems to the same
+    tolerances, under no smaller limits. It is later, or it has run more.
     """
     limits: dict[tuple[Any, ...], dict[tuple[Any, ...], float]] = defaultdict(dict)
     last: dict[tuple[Any, ...], float] = defaultdict(float)
@@ -217,20 +223,20 @@ def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
         own[kind] = max(row["time_limit"], own.get(kind, 0.0))
         last[version_of(row)] = max(row["started"] or 0.0, last[version_of(row)])
     return {
-        old
-        for old, theirs in limits.items()
+        one
+        for one, theirs in limits.items()
         if any(
-            new[:-1] == old[:-1]
-            and last[new] > last[old]
+            other[: len(SOLVER)] == one[: len(SOLVER)]
+            and (len(own), last[other]) > (len(theirs), last[one])
             and all(own.get(kind, 0.0) >= limit for kind, limit in theirs.items())
-            for new, own in limits.items()
+            for other, own in limits.items()
         )
     }
 
 
 def _keys_of(parts: Iterable[Shard]) -> Iterator[dict[str, Any]]:
     """What `replaced` reads of the runs of parts."""
-    names = (*KIND, *OWN, "time_limit", "started")
+    names = (*KIND, *VERSION, "time_limit", "started")
     return (row for part in parts for row in rows_of(part.path, names))
 
 

@@ -70,7 +70,8 @@ TAKEN: Final = {
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
     "programs have run, with their default options, beside the runs of `candidates` and "
-    "`matrix` on these.",
+    "`matrix` on these. Short solves of Siconos were timed in ticks of the clock, which are some "
+    "milliseconds long. So single times of this size are coarse.",
 }
 # facts of a problem whose effect is asked for: the column, and its words
 EFFECTS: Final = {

@@ -21,7 +21,7 @@ KINDS = {
     "rolling_fc3d": ("rollingFrictionContact_new_from_filename", "rolling_fc3d_driver"),
 }
 
-# [s] under a limit of CPU time Linux counts that of a process by its ticks, of 10 ms at most
+# [s] If a process has a limit of CPU time, Linux counts its CPU time in ticks, of 10 ms at most.
 COARSE = 0.02
 
 

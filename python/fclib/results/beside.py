@@ -214,7 +214,7 @@ def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
     """The versions of solvers that a comparison leaves out, as `version_of` names them.
 
     Another version of the solver, with the same options, has run the same problems to the same
-    tolerances, under no smaller limits. It is later, or it has run more.
+    tolerances, under no smaller limits of time. It is later, or it has run more.
     """
     limits: dict[tuple[Any, ...], dict[tuple[Any, ...], float]] = defaultdict(dict)
     last: dict[tuple[Any, ...], float] = defaultdict(float)

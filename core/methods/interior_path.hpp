@@ -53,6 +53,12 @@ constexpr double last_sigma = 0.9;
 constexpr int attempts = 3;
 constexpr double least_cap = 0.9;  // the cap is 1 - tau, between this and step_cap
 
+/// x of x - y = z and x y = tau, without cancellation.
+inline double root(double z, double tau) {
+  const double length = std::sqrt(z * z + 4 * tau);
+  return z > 0 ? 0.5 * (z + length) : 2 * tau / (length - z);
+}
+
 }  // namespace interior
 
 /// Follows the path from the iterate of `cones`. `report(k)` gets each iterate and returns its

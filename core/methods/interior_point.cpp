@@ -59,11 +59,6 @@ void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& gues
   scaling_.resize(static_cast<std::size_t>(problem_.nc()));
   r_ = units_.to_own(guess);
   units_.product(r_, units_.q(), u_);
-  // x of x - y = z and x y = tau, without cancellation
-  const auto root = [&](double z) {
-    const double length = std::sqrt(z * z + 4 * rules.tau);
-    return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
-  };
   for (Index a = 0; a < problem_.nc(); ++a) {
     const double mu = problem_.friction.mu[a];
     const auto r = r_.template segment<D>(D * a);
@@ -75,8 +70,8 @@ void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& gues
       Vec z = r - u;
       z[0] = mu * r[0] - (u[0] / mu + shift);
       const double norm = z.template tail<T>().norm();
-      const double high = root(z[0] + norm);  // the spectral values of x
-      const double low = root(z[0] - norm);
+      const double high = interior::root(z[0] + norm, rules.tau);  // the spectral values of x
+      const double low = interior::root(z[0] - norm, rules.tau);
       x[0] = 0.5 * (high + low);
       y[0] = 0.5 * rules.tau * (1 / high + 1 / low);
       if (norm > 0) {
@@ -85,7 +80,7 @@ void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& gues
         y.template tail<T>() = 0.5 * rules.tau * (1 / high - 1 / low) * along;
       }
     } else {
-      x[0] = root(r[0] - u[0]);
+      x[0] = interior::root(r[0] - u[0], rules.tau);
       y[0] = rules.tau / x[0];
     }
     x_.template segment<D>(D * a) = x;

@@ -91,11 +91,6 @@ void ProductInteriorPoint<Cone>::start(const InteriorPointRules& rules, const Ve
   for (Vector* v : {&u_, &dr_, &rhs_, &residual_vector_}) v->setZero(m);
   r_ = units_.to_own(guess);
   units_.product(r_, units_.q(), u_);
-  // x of x - y = z and x y = tau, without cancellation
-  const auto root = [&](double z) {
-    const double length = std::sqrt(z * z + 4 * rules.tau);
-    return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
-  };
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Vec u = Cone(units_.friction(), a).modified(u_.template segment<D>(D * a));
     auto r = r_.template segment<D>(D * a);
@@ -112,8 +107,8 @@ void ProductInteriorPoint<Cone>::start(const InteriorPointRules& rules, const Ve
       z[0] -= u[0] * group.coefficient / squares;
       if (group.tail) z.template tail<T>() -= u.template segment<T>(at);
       const double norm = z.template tail<T>().norm();
-      const double high = root(z[0] + norm);  // the spectral values of x
-      const double low = root(z[0] - norm);
+      const double high = interior::root(z[0] + norm, rules.tau);  // the spectral values of x
+      const double low = interior::root(z[0] - norm, rules.tau);
       normal = std::max(normal, 0.5 * (high + low) / group.coefficient);
       group.y[0] = 0.5 * rules.tau * (1 / high + 1 / low);
       if (!(norm > 0)) {

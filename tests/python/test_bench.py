@@ -910,6 +910,7 @@ def test_one_form_of_a_problem_is_run(
         ({"problems": [{"family": "x"}]}, "neither files"),
         ({"problems": [{"set": "tiny", "form": "square"}]}, r"problems\[0\]\.form"),
         ({"problems": [{"set": "tiny", "form": "both"}]}, r"'both' is none of global, local"),
+        ({"problems": [{"simulate": {}, "form": "both"}]}, r"'both' is none of global, local"),
         ({"budget": "long"}, "budget"),
         ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
         ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),
@@ -959,6 +960,21 @@ def test_scenes_that_are_not_understood() -> None:
         chosen = campaign(problems=[{"simulate": {"steps": [1], **recipe}}])
         with pytest.raises(fclib.OptionError, match=word):
             chosen.plan()
+
+
+def test_steps_of_a_scene_in_either_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path))
+    group = {"simulate": {"family": "Chain", "steps": [40]}}
+    found: dict[str | None, Any] = {}
+    for form in (None, "local", "global"):
+        chosen = campaign(problems=[{**group, **({"form": form} if form else {})}])
+        found[form] = fclib.read(chosen.plan()[0].problem.path)
+    assert isinstance(found["global"], fclib.GlobalProblem)
+    assert found["global"].contacts is not None
+    for form in (None, "local"):
+        assert isinstance(found[form], fclib.LocalProblem)
+        assert found["global"].condense().q == pytest.approx(found[form].q, abs=1e-12)
 
 
 def test_solvers_that_may_be_missing() -> None:

@@ -400,6 +400,7 @@ class Campaign:
                 parameters=group.simulate.get("parameters", {}),
                 steps=group.simulate["steps"],
                 seed=group.simulate.get("seed", 0),
+                form=group.form,
             )
         if group.planted is not None:
             paths += generated.planted(
@@ -579,7 +580,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
     _only(row, KNOWN_OF_PROBLEMS, where)
     if not WHAT & set(row):
         raise CampaignError(f"{where[:-1]}: has neither files, set, simulate nor planted")
-    forms = ("global", "local") if "set" in row else ("global", "local", "both")
+    forms = ("global", "local", "both") if "files" in row else ("global", "local")
     if row.get("form") not in (None, *forms):
         raise CampaignError(f"{where}form: {row['form']!r} is none of {', '.join(forms)}")
     steps = None

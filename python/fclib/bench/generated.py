@@ -60,11 +60,22 @@ def files_of(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Pa
 
 
 def simulated(
-    family: str, parameters: Mapping[str, Any], steps: Sequence[int], seed: int
+    family: str,
+    parameters: Mapping[str, Any],
+    steps: Sequence[int],
+    seed: int,
+    form: str | None = None,
 ) -> list[Path]:
-    """The local problems of some steps of a scene, with the names of their contacts.
+    """The problems of some steps of a scene, with the names of their contacts.
 
     Steps without contact are left out.
+
+    Args:
+        family: name of the scene.
+        parameters: those of the scene that are not its defaults.
+        steps: numbers of time steps, from 0 on.
+        seed: random seed of the scene.
+        form: "global", or by default "local".
 
     Raises:
         ImportError: MuJoCo is not there.
@@ -81,6 +92,8 @@ def simulated(
         "seed": seed,
         "geometry": True,
     }
+    if form == "global":
+        recipe["form"] = form
 
     def make(folder: Path) -> None:
         from fclib import simulate
@@ -98,10 +111,9 @@ def simulated(
             if step.index in wanted and step.problem.nc:
                 # the model is in the state of the step until the next one is asked for
                 contacts, bodies = simulate.geometry_of(step.model, step.contacts)
-                local = step.problem.condense().replace(
-                    info=step.problem.info, contacts=contacts, bodies=bodies
-                )
-                _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
+                problem: Any = step.problem if form == "global" else step.problem.condense()
+                named = problem.replace(info=step.problem.info, contacts=contacts, bodies=bodies)
+                _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", named)
 
     return files_of(recipe, make)
 

@@ -10,10 +10,13 @@
 #include "chain/chain.hpp"
 #include "linalg/cpu_time.hpp"
 #include "linalg/memory.hpp"
+#include "methods/alternating_directions.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/pivoting.hpp"
 #include "methods/product_interior_point.hpp"
 #include "methods/spectral_gradient.hpp"
+#include "reduced/convex_sets.hpp"
+#include "reduced/de_saxce_shift.hpp"
 #include "reduced/in_own_units.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
@@ -96,6 +99,9 @@ double least_factorisation_cost(const ReducedProblem& problem) {
 double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& system) {
   return least_factorisation_cost(problem) + system.flops();
 }
+
+/// Of a solve with the factors.
+double solve_cost(const CoupledSystem& system) { return 2 * system.bytes() / sizeof(double); }
 
 /// Random numbers, the same on every machine.
 class Random {
@@ -313,18 +319,17 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
 }
 
 template <class Cone>
-double Island<Cone>::paid_for(const Patience& rules) {
+double Island<Cone>::paid_for(const Patience& rules, double cost) {
   const double factorisations = !fits(system().bytes()) ? instead_of_factors
                                 : rules.worth > 0 ? rules.worth
                                                   : static_cast<double>(system().factorisations());
-  const double steps =
-      factorisations * factorisation_cost(problem_, system()) / sweep_cost(problem_);
+  const double steps = factorisations * factorisation_cost(problem_, system()) / cost;
   return rules.worth > 0 && steps < 2.0 * static_cast<double>(rules.first_look) ? 0.0 : steps;
 }
 
 template <class Cone>
 void Island<Cone>::run(const SweepOnStage& rules) {
-  const double budget = paid_for(rules);
+  const double budget = paid_for(rules, sweep_cost(problem_));
   ConvergenceRate rate(rules.first_look, budget, tolerance_);
   r_ = best_;
   problem_.velocity(r_, u_);
@@ -343,7 +348,7 @@ void Island<Cone>::run(const SweepOnStage& rules) {
 
 template <class Cone>
 void Island<Cone>::run(const SpectralGradientStage& rules) {
-  const double budget = paid_for(rules);
+  const double budget = paid_for(rules, sweep_cost(problem_));
   if (!(budget > 0)) return;
   ConvergenceRate rate(rules.first_look, budget, tolerance_);
   Vector r = start_of(rules.from);
@@ -362,6 +367,36 @@ void Island<Cone>::run(const SpectralGradientStage& rules) {
     const std::int64_t count = std::exchange(since, 0);
     return take(count, error, r) || static_cast<double>(k) > budget || rate.hopeless(k, error);
   });
+}
+
+template <class Cone>
+void Island<Cone>::run(const AlternatingDirectionsStage& rules) {
+  const double budget = paid_for(rules, sweep_cost(problem_) + solve_cost(system()));
+  if (!(budget > 0)) return;
+  ConvergenceRate rate(rules.first_look, budget, tolerance_);
+  const Cones<Cone> cones(problem_.friction);
+  AlternatingDirections<Cone> step(problem_, system(), {});
+  Vector u(problem_.m());
+  Vector shift(problem_.nc());
+  const Vector start = guessed_ ? best_ : Vector(Vector::Zero(problem_.m()));
+  problem_.velocity(start, u);
+  de_saxce_shift<Cone>(u, problem_.friction, shift);
+  if (!step.start(start, u, shift)) return;
+  std::int64_t since = 0;  // steps since the last look
+  for (std::int64_t k = 1; static_cast<double>(k) < budget; ++k) {
+    step.x_update(shift);
+    step.z_update(cones);
+    step.w_update();
+    step.velocity(u);
+    de_saxce_shift<Cone>(u, problem_.friction, shift);
+    if (++since >= std::min(steps_per_look, tracker_.left())) {
+      problem_.velocity(step.z(), u);
+      const double error = relative_error<Cone>(problem_, u, step.z());
+      if (take(std::exchange(since, 0), error, step.z())) return;
+      if (rate.hopeless(k, error)) return;
+    }
+    if (!step.adapt()) return;
+  }
 }
 
 template <class Cone>

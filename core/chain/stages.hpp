@@ -62,11 +62,12 @@ class Island {
   /// Whether so many operations of sweeps take at most the time of so many factorisations. The
   /// system is analysed only if that decides.
   bool pays(double operations, double factorisations);
-  /// The number of steps that a stage may make, from what one step costs.
-  double paid_for(const Patience& rules);
+  /// The number of steps that a stage may make, from what one step costs [operations].
+  double paid_for(const Patience& rules, double cost);
   void run(const SweepOnStage& rules);
   void run(const SpectralGradientStage& rules);
   void run(const ConjugateGradientsStage& rules);
+  void run(const AlternatingDirectionsStage& rules);
   void project(Vector& r) const;
   [[nodiscard]] double violation(const Vector& r) const;
   void proximal(ProximalRules rules, Vector r);

@@ -162,6 +162,14 @@ struct SpectralGradientStage : Patience {
   }
 };
 
+/// For many bodies at rest: one factorisation serves many steps.
+struct AlternatingDirectionsStage : Patience {
+  static constexpr std::string_view name = "alternating_directions";
+  static constexpr std::string_view families = "optimisation";
+  static constexpr std::string_view doc =
+      "ADMM with de Saxce's term in the loop, as long as it may end for what factorisations cost.";
+};
+
 /// On W r = -q, preconditioned by tr(W_aa). It starts from the guess, or from r = 0.
 struct ConjugateGradientsStage {
   static constexpr std::string_view name = "conjugate_gradients";
@@ -378,10 +386,11 @@ struct OwnUnitsStage {
   static constexpr auto fields() { return std::tuple{start_from(&OwnUnitsStage::from)}; }
 };
 
-using Method = std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage,
-                            ConjugateGradientsStage, NewtonStage, PolishStage, ProximalStage,
-                            InteriorPointStage, AssociatedStage, NoSolutionStage, HeldBodiesStage,
-                            HomotopyStage, PivotingStage, RandomStartsStage, OwnUnitsStage>;
+using Method =
+    std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage, ConjugateGradientsStage,
+                 AlternatingDirectionsStage, NewtonStage, PolishStage, ProximalStage,
+                 InteriorPointStage, AssociatedStage, NoSolutionStage, HeldBodiesStage,
+                 HomotopyStage, PivotingStage, RandomStartsStage, OwnUnitsStage>;
 
 struct StageRule {
   std::string name;

@@ -11,8 +11,9 @@ namespace fclib {
 
 template <class Cone>
 AlternatingDirections<Cone>::AlternatingDirections(const ReducedProblem& problem,
+                                                   CoupledSystem& system,
                                                    AlternatingDirectionsRules rules, bool weighted)
-    : problem_(problem), rules_(rules), system_(problem), weight_(contact_weights(problem)) {
+    : problem_(problem), rules_(rules), system_(system), weight_(contact_weights(problem)) {
   if (!weighted) weight_.setConstant(problem.nc() > 0 ? weight_.mean() : 1.0);
   due_ = rules.interval;
   for (Index a = 0; a < problem.nc(); ++a)

@@ -40,8 +40,9 @@ class AlternatingDirections {
   static constexpr int D = Cone::dim;
   using Vec = typename Cone::Vec;
 
-  AlternatingDirections(const ReducedProblem& problem, AlternatingDirectionsRules rules,
-                        bool weighted = true);
+  /// Keeps references to the problem and to its system.
+  AlternatingDirections(const ReducedProblem& problem, CoupledSystem& system,
+                        AlternatingDirectionsRules rules, bool weighted = true);
 
   /// From r. The multiplier is the velocity of r with the shift. Returns false if W is not finite.
   bool start(const Vector& r, const Vector& u, const Vector& shift);
@@ -86,7 +87,7 @@ class AlternatingDirections {
 
   const ReducedProblem& problem_;
   AlternatingDirectionsRules rules_;
-  CoupledSystem system_;
+  CoupledSystem& system_;
   Vector weight_;
   double rho_ = 0;
   double theta_ = 1;

@@ -63,7 +63,7 @@ template <class Set>
 void ConvexProgram<Set>::admm(const Set& set, const AlternatingDirectionsRules& rules,
                               double accuracy, std::int64_t limit, Vector& r, Vector& u, Due due,
                               Follow follow) {
-  if (!admm_) admm_.emplace(problem_, rules);
+  if (!admm_) admm_.emplace(problem_, system_.emplace(problem_), rules);
   if (!admm_->start(r, u, shift_)) return;
   std::int64_t told = 0;
   for (std::int64_t k = 1; k <= limit; ++k) {

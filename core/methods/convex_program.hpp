@@ -65,6 +65,7 @@ class ConvexProgram {
   Vector shift_;
   std::vector<ContactCurvature<Cone>> contacts_;
   std::optional<AcceleratedGradient<Cone>> gradient_;
+  std::optional<CoupledSystem> system_;
   std::optional<AlternatingDirections<Cone>> admm_;
 };
 

@@ -86,7 +86,8 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   de_saxce_shift<Cone>(u, problem.friction, shift);
   if (best.report(0, r, u)) return best.outcome(r);
 
-  AlternatingDirections<Cone> step(problem,
+  CoupledSystem system(problem);
+  AlternatingDirections<Cone> step(problem, system,
                                    {.rho = options.rho,
                                     .relaxation = options.relaxation,
                                     .penalty = options.penalty,

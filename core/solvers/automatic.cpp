@@ -27,6 +27,8 @@ newton from the guess           : semismooth_newton   at_least=5 below=0.003 gue
 gauss-seidel                    : gauss_seidel                                         limit=100
 # large and dense, to a loose tolerance: a factorisation costs as much as hundreds of products with W
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
+# very many bodies, most of them at rest: one factorisation serves many steps (docs/results/walls.csv)
+alternating directions          : alternating_directions at_least=5000                 worth=20 first_look=60
 proximal newton                 : polish              below=1e-5                       limit=24
 # a guess on bodies that are held, by one of many reactions (Gripper of `sequences`)
 proximal point from the guess   : proximal_point      below=1e-3 guessed=true from=best limit=25

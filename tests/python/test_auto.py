@@ -646,6 +646,28 @@ def test_the_history_ends_with_the_error_of_the_result(number: int) -> None:
     assert result.history[-1][0] == result.iterations
 
 
+def test_one_factorisation_serves_many_steps_of_bodies_at_rest() -> None:
+    wall: Any = fclib.scenes.assemblies()["Wall"]()
+    problem = wall.of_size(400, 0.0, 0)
+    chain = "a : alternating_directions worth=1000 first_look=20"
+    (stage,) = converged(problem, tol=1e-6, chain=chain).stages
+    assert 1 <= stage.factorisations <= 5 < stage.iterations
+    # the limit of iterations holds to the last one
+    result = fclib.solve(problem, tol=1e-9, chain=chain, max_iterations=17)
+    assert (result.status, result.iterations) == ("iteration_limit", 17)
+    # from a solution none is needed, and a nearby one is worth some
+    solution = fclib.solve(problem, tol=1e-10).solution
+    nearby = problem.replace(f=problem.f * (1 + 1e-6))
+    warm = converged(nearby, tol=1e-6, chain=chain, guess=solution)
+    assert sum(s.iterations for s in warm.stages) < stage.iterations
+    # memory for no factors: it is left out
+    result = fclib.solve(problem, tol=1e-6, chain=chain, memory_limit=1e-9, max_iterations=50)
+    assert not result.converged
+    # what they may cost does not pay for twice the first look
+    result = fclib.solve(problem, tol=1e-6, chain="a : alternating_directions worth=1")
+    assert [stage.iterations for stage in result.stages] == [0]
+
+
 @pytest.mark.parametrize("method", ["sweep_on", "spectral_gradient"])
 def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
     packing: Any = fclib.scenes.assemblies()["Packing"]()

@@ -84,11 +84,12 @@ EFFECTS: Final = {
 
 RATIO: Final = "cold CPU / warm CPU"
 WARM: Final = (
-    "Each step of the simulations in `sequences` is solved from nothing (cold), and from the solution that the "
-    "same solver found for the step before (warm). The ratio is the CPU time of all steps, cold "
-    "over warm: the larger, the more the guess is worth. A failed run counts with the time that it took. The mean "
-    "is geometric, over the families. In most of these simulations bodies collide or roll, so the "
-    "reactions change much from step to step. In `Gripper` they hardly do."
+    "Each step of the simulations in `sequences` is solved from nothing (cold), and from the "
+    "solution that the same solver found for the step before (warm). The ratio is the CPU time of "
+    "all steps, cold over warm: the larger, the more the guess is worth. A failed run counts with "
+    "the time that it took. The mean is geometric, over the families. In most of these simulations "
+    "bodies collide or roll, so the reactions change much from step to step. In `Gripper` they "
+    "hardly do."
 )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import reprlib
+from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType
@@ -258,4 +259,10 @@ def _plain(name: str, value: object) -> bool | int | float | str:
         return value
     if isinstance(value, int) and -(2**63) <= value < 2**63:
         return value
-    raise _core.OptionError(f"option {name}: {value!r} is not a truth value, a number or a text")
+    if isinstance(value, Mapping):
+        raise _core.OptionError(
+            f"option {name}: is a table; give each option by its name, as in relaxation=1.2, or a "
+            f"table as **{name}"
+        )
+    shown = reprlib.repr(value)
+    raise _core.OptionError(f"option {name}: {shown} is not a truth value, a number or a text")

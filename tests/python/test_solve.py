@@ -511,6 +511,8 @@ def test_a_name_with_spaces_is_a_name(tmp_path: Path) -> None:
         ({"relaxation": ""}, "relaxation"),
         ({"relaxation": [1.0]}, "relaxation"),
         ({"relaxation": None}, "relaxation"),
+        ({"relaxation": list(range(1000))}, r"relaxation: \[0, 1, 2, 3, 4, 5, \.\.\.\] is not"),
+        ({"options": {"relaxation": 1.2}}, r"options: is a table; .* a table as \*\*options"),
         ({"seed": 1.5}, "seed"),
         ({"seed": -1}, "seed"),
         ({"seed": 2**64}, "seed"),

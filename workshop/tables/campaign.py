@@ -440,7 +440,7 @@ def along(store: Path, _: argparse.Namespace) -> list[Table]:
     rows = profiles.load(store, start=None)
     table = [
         {
-            "family": row["sequence"].partition(",")[0].partition("/")[2],
+            "family": row["sequence"].partition(",")[0].rpartition("/")[2],
             "solver": row["solver"],
             "cold CPU / warm CPU": f"{row['cold CPU / warm CPU']:.2f}",
             "iterations warm": row["iterations warm"],
@@ -455,8 +455,8 @@ def along(store: Path, _: argparse.Namespace) -> list[Table]:
     load, limit = max(row["load"] for row in rows), max(row["time_limit"] for row in rows)
     tols = ", ".join(f"{tol:g}" for tol in sorted({row["tol"] for row in rows}))
     note = (
-        f"tolerance {tols}, {limit:g} s of CPU a solve, consecutive problems from the middle of"
-        f" the stored states; load up to {load:.1f}"
+        f"tolerance {tols}, {limit:g} s of CPU a solve, steps that follow each other; load up to "
+        f"{load:.1f}"
     )
     return [Table(table, "Warm against cold along sequences", note)]
 

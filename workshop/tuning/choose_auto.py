@@ -333,6 +333,13 @@ def changes(lines: list[str]) -> list[Change]:
     longer = f"{spectral}, longer"
     change = with_rules(place(lines, longer), **{"from": "best"})
     result.append(Change(f"{longer}: from=best", longer, change))
+    alternating = "alternating directions"
+    for key, numbers in (("worth", (10, 40)), ("first_look", (30, 100)), ("at_least", (1000,))):
+        for number in numbers:
+            change = with_rules(place(lines, alternating), **{key: number})
+            # a lower gate lets other problems in
+            stage = "gauss-seidel" if key == "at_least" else alternating
+            result.append(Change(f"{alternating}: {key}={number}", stage, change))
     polish = place(lines, "proximal newton")
     for below in ("1e-6", "1e-4", "1e-3"):
         result.append(

@@ -1,4 +1,4 @@
-"""What the stages of `auto` that start from a guess are worth, along stored simulations.
+"""What the stages of `auto` that start from a guess are worth, along simulations.
 
     python -m workshop.tuning.guesses NAME... [--steps 16] [--from 0] [--tols 1e-4 1e-6 1e-8]
         [--results auto-guesses]
@@ -10,10 +10,9 @@ of it: without a stage, or with another rule. A time is the least CPU time of th
 conversions; changes take turns in random order, so the load of the machine is the same for all. A
 solve that does not converge counts with its time.
 
-A row says of a change, to a tolerance: the geometric mean over families of the ratio of cold to
-warm (of a family the geometric mean of its steps), and the least ratio with its family, there the
-ratio of the sums. Stages pay if the mean is less without them, and the least is no smaller with
-them. What is chosen is chosen on `sequences`, BoxesStack and Capsules; others judge.
+A row says of a change, to a tolerance: the ratio of cold to warm as a geometric mean over the steps
+of a family and then over families; and the family whose sums of times have the least ratio. A stage
+pays if the mean is less without it. What is chosen is chosen on `sequences`, BoxesStack and Capsules; others judge.
 """
 
 from __future__ import annotations

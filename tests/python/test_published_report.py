@@ -211,3 +211,11 @@ def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:
     said("profile", code=2)
     stores = [run / "small.sqlite"] * 2
     said("report", *stores, "--with", part, "--out", out, code=2)
+
+
+def test_what_a_guess_is_worth_by_solver() -> None:
+    counts = {"solved warm": 3, "solved cold": 2, "of": 4}
+    rows = {"A": {published.RATIO: 0.5, **counts}, "B": {published.RATIO: 8.0, **counts}}
+    row = published.warm_row("nsgs", rows, 2.0)
+    assert (row["least"], row["most"]) == ("0.50 (A)", "8.00 (B)")
+    assert (row["solved warm"], row["solved cold"], row["of"]) == (6, 4, 8)

@@ -12,7 +12,8 @@ solve that does not converge counts with its time.
 
 A row says of a change, to a tolerance: the ratio of cold to warm as a geometric mean over the steps
 of a family and then over families; and the family whose sums of times have the least ratio. A stage
-pays if the mean is less without it. What is chosen is chosen on `sequences`, BoxesStack and Capsules; others judge.
+pays if the mean is less without it. What is chosen is chosen on `sequences`, BoxesStack and
+Capsules; others judge.
 """
 
 from __future__ import annotations

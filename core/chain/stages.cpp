@@ -308,10 +308,12 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
       if (!std::isfinite(error)) return_to_best();
       return;
     }
-    if (rules.worth > 0 && k >= 2 * interval && k >= limit / 4) {
+    if ((rules.left > 0 || rules.worth > 0) && k >= 2 * interval && k >= limit / 4) {
       const double rate = std::log(last / error) / static_cast<double>(count);
       const double left = std::log(error / tolerance_) / rate;
-      if (!(rate > 0) || !pays(left * sweep_cost(problem_), worth)) return;
+      if (!(rate > 0)) return;
+      if (rules.left > 0 && left > static_cast<double>(rules.left)) return;
+      if (rules.worth > 0 && !pays(left * sweep_cost(problem_), worth)) return;
       if (k == limit && left < extension * static_cast<double>(limit)) limit += interval;
     }
     last = error;

@@ -110,6 +110,7 @@ struct GaussSeidelStage {
   static constexpr std::string_view families = "splitting";
   static constexpr std::string_view doc = "Sweeps of nonsmooth Gauss-Seidel.";
   std::int64_t limit = 100;
+  std::int64_t left = 0;
   double worth = 3;
 
   static constexpr auto fields() {
@@ -117,6 +118,8 @@ struct GaussSeidelStage {
     return std::tuple{
         option("limit", &O::limit, "sweeps", {1, 1e9},
                "The largest number of sweeps. There are more if they converge soon."),
+        option("left", &O::left, "sweeps", {0, 1e9},
+               "The largest number of sweeps that may be left, at their rate. 0: any number."),
         option("worth", &O::worth, "factorisations a digit", {0},
                "What the sweeps that are left, at their rate, may cost for each digit of the "
                "tolerance. 0: anything.")};
@@ -411,9 +414,10 @@ inline bool coulomb_alone(const Method& method) {
          std::holds_alternative<HeldBodiesStage>(method);
 }
 
-/// Whether a method factorises a matrix.
+/// Whether a method factorises the system that all methods share. Newton's has its own.
 inline bool factorises(const Method& method) {
-  return !std::holds_alternative<GaussSeidelStage>(method) &&
+  return !std::holds_alternative<NewtonStage>(method) &&
+         !std::holds_alternative<GaussSeidelStage>(method) &&
          !std::holds_alternative<SweepOnStage>(method) &&
          !std::holds_alternative<SpectralGradientStage>(method) &&
          !std::holds_alternative<ConjugateGradientsStage>(method);

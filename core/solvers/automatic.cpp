@@ -20,10 +20,10 @@ constexpr const char* table = R"(
 gauss-seidel                    : gauss_seidel        on=whole                         limit=20 worth=0
 # bodies at rest that stick everywhere, from the guess if there is one
 conjugate gradients             : conjugate_gradients at_least=20                      limit=400
-# a guess (docs/results/auto-guesses.csv): sweeps if they end soon (ClosedChains of `sequences`)
-gauss-seidel from the guess     : gauss_seidel        at_least=20 guessed=true         limit=10 worth=0.5
+# a guess (docs/results/auto-guesses.csv): sweeps if few are left (ClosedChains of `sequences`)
+gauss-seidel from the guess     : gauss_seidel        guessed=true                     limit=10 left=40 worth=0
 # Newton's method, if the statuses are nearly known (a stack of boxes, a rover at rest)
-newton from the guess           : semismooth_newton   at_least=5 below=0.003 guessed=true bodies=more from=best function=alart_curnier sweeps=0 patience=3 limit=12
+newton from the guess           : semismooth_newton   below=0.003 guessed=true bodies=more from=best function=alart_curnier sweeps=0 patience=3 limit=12
 gauss-seidel                    : gauss_seidel                                         limit=100
 # large and dense, to a loose tolerance: a factorisation costs as much as hundreds of products with W
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
@@ -31,7 +31,7 @@ spectral gradient               : spectral_gradient   at_least=150 law=coulomb  
 alternating directions          : alternating_directions at_least=5000                 worth=20 first_look=60
 proximal newton                 : polish              below=1e-5                       limit=24
 # a guess on bodies that are held, by one of many reactions (Gripper of `sequences`)
-proximal point from the guess   : proximal_point      below=1e-3 guessed=true from=best limit=25
+proximal point from the guess   : proximal_point      below=1e-3 guessed=true from=best limit=50
 # from near what the sweeps have; if it slows down, the proximal point is near enough
 interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60
 # dense heaps on which its path ends, or no memory for factors (ChainMail/0599 to 1e-4)

@@ -570,6 +570,18 @@ def test_a_problem_in_its_own_units_is_the_same_problem(law: str) -> None:
     assert fclib.solve(problem, chain="own : own_units range=1").status == "stalled"
 
 
+def test_sweeps_end_if_too_many_are_left() -> None:
+    problem = fclib.load("tiny/Capsules/0300")
+    chain = "a : gauss_seidel on=whole limit=10 worth=0"
+    full = fclib.solve(problem, chain=chain.replace("limit=10", "limit=1000"))
+    wanted = full.iterations
+    assert full.status == "converged"
+    assert wanted > 30
+    # after ten sweeps there are about `wanted - 10` left: with a larger bound they go on
+    assert fclib.solve(problem, chain=f"{chain} left={2 * wanted}").iterations > 20
+    assert fclib.solve(problem, chain=f"{chain} left=1").iterations == 10
+
+
 def test_conjugate_gradients_count_each_iteration_once() -> None:
     rng = np.random.default_rng(69)
     A = rng.normal(size=(6, 6))

@@ -689,6 +689,17 @@ def test_short_solves_of_siconos_are_timed_under_a_limit_of_cpu_time() -> None:
 
 
 @needs_siconos
+def test_a_solve_of_siconos_is_timed_by_its_least_call() -> None:
+    one = fclib.solve(problem_of(), "siconos:nsgs")
+    many = fclib.solve(problem_of(), "siconos:nsgs", calls=20)
+    assert many.iterations == one.iterations
+    assert np.array_equal(many.solution.r, one.solution.r)
+    assert many.cpu_s > 0
+    with pytest.raises(fclib.OptionError, match="calls"):
+        fclib.solve(problem_of(), "siconos:nsgs", calls=0)
+
+
+@needs_siconos
 def test_unknown_solvers_of_siconos_come_with_the_known_ones() -> None:
     with pytest.raises(fclib.OptionError, match="siconos:nsgs"):
         fclib.find_solver("siconos:magic")

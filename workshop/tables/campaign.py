@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from fclib import bench, scenes
 from fclib._verdicts import is_solved
@@ -41,6 +42,7 @@ from fclib.bench.table import Table as Runs
 from workshop.tables import _results
 
 Row: TypeAlias = dict[str, Any]
+Times: TypeAlias = npt.NDArray[np.float64]
 
 STORES = _results.ROOT / "build" / "campaigns"
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
@@ -278,21 +280,14 @@ def pairs(store: Path, _: argparse.Namespace) -> list[Table]:
     return tables
 
 
-def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
-    """`auto` beside the fastest solver of Siconos, picked after the runs for each problem."""
-    whole, rows = costs_of(store)
-    part = whole.at(whole.tolerances[-1])
-    theirs = [k for k, name in enumerate(part.solvers) if name.startswith(SICONOS)]
-    if "auto" not in part.solvers or not theirs:
-        raise SystemExit(f"{store}: has no runs of auto, or none of Siconos")
-    ours = part.values[:, part.solvers.index("auto")]
-    best = comparison.least(part.values[:, theirs])
+def hindsight_figures(ours: Times, best: Times, contacts: npt.NDArray[np.int64]) -> list[Row]:
+    """Figures of the CPU times [s] of `auto` and of the best of others; inf is not solved."""
     both = np.isfinite(ours) & np.isfinite(best)
     ratios = ours[both] / best[both]
-    large = ratios[np.array([one.nc >= LARGE for one in part.instances])[both]]
+    large = ratios[contacts[both] >= LARGE]
     long = ratios[best[both] >= SHORT]
     found: list[tuple[str, Any]] = [
-        ("problems", len(part.instances)),
+        ("problems", len(ours)),
         ("solved by auto", int(np.isfinite(ours).sum())),
         ("solved by one of Siconos", int(np.isfinite(best).sum())),
         ("solved by both", len(ratios)),
@@ -310,10 +305,23 @@ def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
     if len(large):
         mean = statistics.geometric_mean(large)
         found.append((f"geometric mean from {LARGE} contacts on", mean))
-    table = [
+    return [
         {"figure": name, "value": f"{value:.3f}" if isinstance(value, float) else value}
         for name, value in found
     ]
+
+
+def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
+    """`auto` beside the fastest solver of Siconos, picked after the runs for each problem."""
+    whole, rows = costs_of(store)
+    part = whole.at(whole.tolerances[-1])
+    theirs = [k for k, name in enumerate(part.solvers) if name.startswith(SICONOS)]
+    if "auto" not in part.solvers or not theirs:
+        raise SystemExit(f"{store}: has no runs of auto, or none of Siconos")
+    ours = part.values[:, part.solvers.index("auto")]
+    best = comparison.least(part.values[:, theirs])
+    contacts = np.array([one.nc for one in part.instances])
+    table = hindsight_figures(ours, best, contacts)
     title = "`auto` beside the fastest solver of Siconos, picked in hindsight"
     return [Table(table, title, f"{profiles.caption(part, rows)}.")]
 

@@ -12,7 +12,8 @@ solve that does not converge counts with its time.
 
 A row says of a change, to a tolerance: the ratio of cold to warm as a geometric mean over the steps
 of a family and then over families; and the family whose sums of times have the least ratio. A stage
-pays if the mean is less without it. What is chosen is chosen on `sequences`, BoxesStack and
+pays if the mean is less without it. A second table, NAME-families, has the means and the ratio of
+each family with the table as it is. What is chosen is chosen on `sequences`, BoxesStack and
 Capsules; others judge.
 """
 
@@ -31,13 +32,21 @@ from workshop.tables import _results
 from workshop.tuning.choose_auto import name_of, place, table, with_rules, without
 
 REPEATS = 3
+WHOLE = "gauss-seidel"
 SWEEPS = "gauss-seidel from the guess"
 NEWTON = "newton from the guess"
 POINT = "proximal point from the guess"
 TRIED: dict[str, dict[str, tuple[float, ...]]] = {
-    SWEEPS: {"worth": (0.25, 1, 2), "limit": (20,), "at_least": (0, 50)},
-    NEWTON: {"below": (1e-3, 1e-2, 3e-2), "most_flops": (2, 5), "patience": (2,), "limit": (6, 24)},
-    POINT: {"below": (1e-4, 1e-2), "limit": (12, 50)},
+    WHOLE: {"limit": (5, 10)},
+    SWEEPS: {"left": (10, 20, 80), "limit": (20,), "at_least": (5, 20)},
+    NEWTON: {
+        "below": (1e-3, 1e-2, 3e-2),
+        "at_least": (5, 20),
+        "most_flops": (2, 5),
+        "patience": (2,),
+        "limit": (6, 24),
+    },
+    POINT: {"below": (1e-4, 1e-2), "limit": (12, 25, 100)},
 }
 
 
@@ -123,6 +132,19 @@ def rows_of(times: dict[str, dict[str, list[float]]], tol: float) -> Iterator[di
         }
 
 
+def row_of_family(name: str, tol: float, times: dict[str, list[float]]) -> dict[str, object]:
+    """The means of a family, cold and warm, with the table as it is."""
+    cold, warm = np.mean(times[""]), np.mean(times["as it is"])
+    return {
+        "family": name,
+        "tolerance": _results.power(tol),
+        "steps": len(times[""]),
+        "cold [ms]": f"{1e3 * cold:.3g}",
+        "warm [ms]": f"{1e3 * warm:.3g}",
+        "cold over warm": f"{cold / warm:.2f}",
+    }
+
+
 def main(words: Sequence[str] | None = None) -> None:
     """Measure all, and print a row for each."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
@@ -136,14 +158,15 @@ def main(words: Sequence[str] | None = None) -> None:
     stored = [name for name in arguments.names if "@" not in name]
     names = [*(collections.folders(stored) if stored else []), *scenes]
     rows: list[dict[str, object]] = []
+    families: list[dict[str, object]] = []
     for tol in arguments.tols:
         times = {}
         for name in names:
             found = measured(name, arguments, tol)
             if found[""]:
                 times[name] = found
-                ratio = sum(found[""]) / sum(found["as it is"])
-                print(f"{name}, to {tol:g}: cold over warm {ratio:.2f}", flush=True)
+                families.append(row_of_family(name, tol, found))
+                print(*families[-1].values(), flush=True)
         if not times:
             raise SystemExit("no step follows the one before it: give other names, or --from")
         rows += rows_of(times, tol)
@@ -154,6 +177,12 @@ def main(words: Sequence[str] | None = None) -> None:
             rows,
             title="Stages of auto that start from a guess, and changes of them",
             note=f"{len(times)} families, {arguments.steps} steps of each at most.",
+        )
+        _results.store(
+            f"{arguments.results}-families",
+            families,
+            title="auto along steps, in a loop: cold beside warm",
+            note=f"{arguments.steps} steps of a family at most; means of the least of {REPEATS}.",
         )
 
 

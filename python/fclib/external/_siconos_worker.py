@@ -25,8 +25,11 @@ KINDS = {
 COARSE = 0.02
 
 
+ENOUGH = 0.01  # [s] A solve is not called again if the calls took so long.
+
+
 def solve(sn: Any, np: Any, order: Any) -> Any:
-    """One solve; the time is only that of the driver."""
+    """One solve; the time is only that of the driver, the least of the calls."""
     read, driver = (getattr(sn, name) for name in KINDS[order["kind"]])
     problem = read(order["path"])
     options = sn.SolverOptions(getattr(sn, order["solver"]))
@@ -34,16 +37,22 @@ def solve(sn: Any, np: Any, order: Any) -> Any:
         sn.solver_options_update_internal(options, 0, getattr(sn, order["one_contact"]))
     options.iparam[0] = order["max_iterations"]
     options.dparam[0] = order["tolerance"]
-    r = np.array(order["r"], dtype=float)
-    u = np.zeros(r.size)
-    start = time.process_time(), time.thread_time()
-    answer = driver(problem, r, u, options)
-    whole, own = time.process_time() - start[0], time.thread_time() - start[1]
+    least, spent = float("inf"), 0.0
+    for _ in range(order["calls"]):
+        r = np.array(order["r"], dtype=float)
+        u = np.zeros(r.size)
+        start = time.process_time(), time.thread_time()
+        answer = driver(problem, r, u, options)
+        whole, own = time.process_time() - start[0], time.thread_time() - start[1]
+        taken = whole if whole - own > COARSE else own  # clearly more: other threads worked
+        least, spent = min(least, taken), spent + taken
+        if spent > ENOUGH:
+            break
     info = answer[0] if isinstance(answer, (tuple, list)) else answer
     return {
         "info": int(info),
         "iterations": int(options.iparam[1]),
-        "cpu_s": whole if whole - own > COARSE else own,  # clearly more: other threads worked
+        "cpu_s": least,
         "r": r.tolist(),
         "u": u.tolist(),
     }

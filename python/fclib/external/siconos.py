@@ -30,12 +30,12 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
 from fclib import _core, _registry
-from fclib._registry import make_solver
+from fclib._registry import Option, make_solver
 from fclib.external._words import RELAXATION
 
 PREFIX = "siconos:"
@@ -48,6 +48,15 @@ BIG = 10**6
 # stored by rows, written in blocks
 STORAGES = {"fc2d": "dense", "fc3d": "csr", "rolling_fc3d": "csc"}
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
+Calls: TypeAlias = Annotated[
+    int,
+    Option(
+        "The number of calls that are timed; fewer if they are long. The least time counts.",
+        unit="calls",
+        lowest=1,
+        highest=1000,
+    ),
+]
 HUBER = "Acary, Bremond & Huber 2018"
 # families, as those of fclib
 SPLIT = "splitting"
@@ -167,8 +176,9 @@ def _entry(
     citation: str,
     iterations: int,
 ) -> _core.SolverInfo:
-    def function(problem: Local, r: Any, monitor: _core.Monitor) -> Any:
-        return _solve(kind, f"SICONOS_{prefix}_{identifier}", one_contact, problem, r, monitor)
+    def function(problem: Local, r: Any, monitor: _core.Monitor, *, calls: Calls = 1) -> Any:
+        name = f"SICONOS_{prefix}_{identifier}"
+        return _solve(kind, name, one_contact, calls, problem, r, monitor)
 
     one_contact = f"SICONOS_{ONE_CONTACT[name]}" if name in ONE_CONTACT else ""
     rolling = kind.startswith("rolling")
@@ -186,7 +196,13 @@ def _entry(
 
 
 def _solve(
-    kind: str, identifier: str, one_contact: str, problem: Local, r: Any, monitor: _core.Monitor
+    kind: str,
+    identifier: str,
+    one_contact: str,
+    calls: int,
+    problem: Local,
+    r: Any,
+    monitor: _core.Monitor,
 ) -> Any:
     """One solve, or two if the tolerances differ in meaning."""
     if monitor.stop(r) or problem.nc == 0:
@@ -202,6 +218,7 @@ def _solve(
             "max_iterations": min(monitor.max_iterations, 2**31 - 1),
             "tolerance": monitor.tolerance,
             "r": r.tolist(),
+            "calls": calls,
         }
         reply = _worker.ask(order, monitor.time_left)
         if reply["info"] == 0 and monitor.error(reply["r"]) > monitor.tolerance:

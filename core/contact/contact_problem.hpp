@@ -1,6 +1,6 @@
-// The problem of one contact for any cone. If the cone has an exact method, that solves it. With
-// spin it is Newton's method, on the status that the contact has. If these fail, projections do it,
-// which never fail.
+// The problem of one contact for any cone. Coulomb's cone has an exact method. With rolling or spin
+// friction it is Newton's method, from the reaction that the contact has. If these fail,
+// projections do it, which never fail.
 #pragma once
 
 #include "contact/cones.hpp"
@@ -10,6 +10,7 @@
 
 namespace fclib {
 
+/// Open in closed form, and Newton's method for the rest.
 template <class Cone>
 struct ContactProblem {
   using Vec = typename Cone::Vec;
@@ -17,7 +18,11 @@ struct ContactProblem {
   ContactProblem(const ContactMatrix<Cone::dim>& block, const Cone& cone)
       : projected(block, cone) {}
 
-  bool solve_exact(const Vec&, Vec&) { return false; }
+  bool solve_exact(const Vec& b, Vec& r) {
+    constexpr double accuracy = 1e-15;
+    constexpr int steps = 20;
+    return newton_alart_curnier(projected.block(), projected.cone(), b, accuracy, steps, r);
+  }
 
   ProjectedContact<Cone> projected;
 };
@@ -32,32 +37,6 @@ struct ContactProblem<Coulomb<D>> {
 
   ExactContact<D> exact;
   ProjectedContact<Coulomb<D>> projected;
-};
-
-/// Open and stick in closed form, and Newton's method for the rest.
-template <class Cone>
-struct NewtonContactProblem {
-  using Vec = typename Cone::Vec;
-
-  NewtonContactProblem(const ContactMatrix<Cone::dim>& block, const Cone& cone)
-      : projected(block, cone) {}
-
-  bool solve_exact(const Vec& b, Vec& r) {
-    constexpr double accuracy = 1e-15;
-    constexpr int steps = 20;
-    return newton_alart_curnier(projected.block(), projected.cone(), b, accuracy, steps, r);
-  }
-
-  ProjectedContact<Cone> projected;
-};
-
-template <>
-struct ContactProblem<Coulomb<4>> : NewtonContactProblem<Coulomb<4>> {
-  using NewtonContactProblem::NewtonContactProblem;
-};
-template <int D>
-struct ContactProblem<Spin<D>> : NewtonContactProblem<Spin<D>> {
-  using NewtonContactProblem<Spin<D>>::NewtonContactProblem;
 };
 
 }  // namespace fclib

@@ -23,8 +23,8 @@ inline constexpr std::string_view local_solvers_doc =
     "The solver of one contact. exact: by its statuses. projection: P_K with local iterations. "
     "diagonal: one projection, with the diagonal in the place of the block. alart-curnier and "
     "fischer-burmeister: damped Newton. hybrid: alart-curnier, then exact. If one finds no "
-    "solution, the projection does. Rolling contacts have no exact solver, and alart-curnier in "
-    "the place of fischer-burmeister.";
+    "solution, the projection does. Contacts with rolling or spin friction have alart-curnier in "
+    "the place of exact and of fischer-burmeister.";
 
 /// One projection in which the diagonal stands for the block of a contact. The normal part comes
 /// first. Each part is projected with the velocities that the parts before it leave. Returns false,

@@ -56,6 +56,13 @@ def test_local_solvers_take_rolling_contacts(local_solver: str, d: int) -> None:
     np.testing.assert_allclose(result.solution.r, r, atol=1e-7)
 
 
+def test_a_rolling_contact_is_solved_in_each_sweep() -> None:
+    problem = fclib.load("tiny/RollingDiscs/0040")
+    by_newton = converged(problem, "nsgs", 1e-6, max_iterations=1000)
+    projected = fclib.solve(problem, "nsgs", 1e-6, local_solver="projection", max_iterations=1000)
+    assert by_newton.iterations < projected.iterations / 10
+
+
 def test_newton_takes_the_sweeps_of_the_exact_solver() -> None:
     exact = fclib.solve(packing(), "nsgs", 1e-9)
     for local_solver in ("alart-curnier", "hybrid"):

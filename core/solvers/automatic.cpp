@@ -44,11 +44,9 @@ proximal point, near            : proximal_point      from=best below=1e-4      
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
 # a tight tolerance, where interior points end at rounding (PeriodicBox/0995 to 1e-12)
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
-# 103494
-gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows (Squeezed/0000)
 no solution?                    : no_solution                                          limit=60
-# cheap beside what follows (a pile of boxes that overlap: drakehard-sap-0140)
+# cheap beside what follows (a jammed aqueduct: Aqueduct_rr9118/0002)
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 # if it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 # (PegInHole/0033)
@@ -58,13 +56,13 @@ semismooth newton               : semismooth_newton   from=nothing law=coulomb f
 own units                       : own_units           range=1e6
 # if most bodies rest: reactions that hold them are found by convex problems, with all that creep
 held bodies                     : held_bodies         at_least=100                     creep=0
-# 100786, 101711
+# 103539
 proximal point                  : proximal_point      from=best                        limit=200
-# slow, but cheaper than the path that follows (101015)
+# slow, but cheaper than the path that follows (drakehard-sap-0140)
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
 # to its end, however often it folds (LowWall/0032)
 homotopy                        : homotopy                                             smoothing=0.3 limit=20000
-# contacts that wedge each other: few enough for dense tableaux (101098; then 100791, 101340)
+# contacts that wedge each other: few enough for dense tableaux (103717; then 100400, 100791)
 pivoting                        : pivoting            at_most=20                       edges=4 tries=60
 pivoting                        : pivoting            at_most=8                        edges=16 tries=40
 # 102888

@@ -46,7 +46,7 @@ interior point, shorter steps   : interior_point      law=coulomb from=nothing  
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
 # a proof is found at once or not at all, and spares what follows (Squeezed/0000)
 no solution?                    : no_solution                                          limit=60
-# cheap beside what follows (a jammed aqueduct: Aqueduct_rr9118/0002)
+# cheap beside what follows (a published run of Aqueduct_rr9118/0002 ended in it)
 interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 # if it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 # (PegInHole/0033)

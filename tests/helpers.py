@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 import subprocess
 import sys
@@ -47,6 +48,22 @@ def needs_siconos_mechanics() -> None:
     code = "import siconos.io.mechanics_run, siconos.mechanics.collision.bullet"
     if subprocess.run([siconos.python(), "-c", code], capture_output=True, check=False).returncode:
         pytest.skip("Siconos has no mechanics with Bullet, or its Python has no SciPy")
+
+
+# ---- the same digits on every processor: sums of BLAS, which NumPy calls, depend on it
+
+
+def product(a: Array, b: npt.NDArray[Any]) -> Array:
+    """A @ b for a matrix A, and a vector or a matrix b."""
+    total = np.zeros(a.shape[:1] + b.shape[1:])
+    for column, row in zip(a.T, b, strict=True):
+        total += np.multiply.outer(column, row)
+    return total
+
+
+def length(x: Array) -> float:
+    """||x|| of a few numbers."""
+    return math.sqrt(sum(float(part) ** 2 for part in x))
 
 
 # ---- the law, in NumPy
@@ -133,7 +150,7 @@ def contact_states(
             status = 2  # without friction there is no sticking
         counts[status] += 1
         tangent = rng.standard_normal(d - 1)
-        tangent /= np.linalg.norm(tangent)
+        tangent /= length(tangent)
         if status == 0:
             u[contact] = [rng.uniform(0.1, 1), *rng.uniform(-1, 1, d - 1)]
             continue
@@ -167,7 +184,7 @@ def rolling_states(
             (slice(1 + half, d), mu_r[k], status in (3, 4)),
         ):
             direction = rng.normal(size=half)
-            direction /= np.linalg.norm(direction)
+            direction /= length(direction)
             r[k, part] = limit * r[k, 0] * direction * (1.0 if moves else 0.5)
             u[k, part] = -direction * rng.uniform(0.5, 2) if moves else 0.0
     return u, r, (counts[0], counts[1], counts[2])

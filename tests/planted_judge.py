@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import math
 import sys
 import tempfile
 from collections import Counter
@@ -40,7 +41,7 @@ import numpy.typing as npt
 import fclib
 from ball_judge import judge
 from fclib import _registry, analysis
-from helpers import SPIN_LAWS, dense, planted_law, spin_states
+from helpers import SPIN_LAWS, dense, planted_law, product, spin_states
 
 Array: TypeAlias = npt.NDArray[np.float64]
 # a problem, a solution of it, and a guess
@@ -57,7 +58,10 @@ SWEEPS = 1_000  # of any other solver: most of what is solved at all is solved b
 
 def bodies_of(rng: np.random.Generator, n: int, ratio: float) -> Array:
     """Masses from 1 to `ratio`, in any order."""
-    return np.exp(rng.uniform(0, np.log(ratio), n)) if ratio > 1 else np.ones(n)
+    if ratio <= 1:
+        return np.ones(n)
+    # not np.exp, whose last digit depends on the processor
+    return np.array([math.exp(x) for x in rng.uniform(0, math.log(ratio), n)])
 
 
 def directions(rng: np.random.Generator, n: int, d: int, nc: int) -> Array:
@@ -70,7 +74,8 @@ def directions(rng: np.random.Generator, n: int, d: int, nc: int) -> Array:
         rank = rng.integers(1, d + 1) if rng.uniform() < 0.5 else d
         touched = rng.choice(n, min(n, max(int(rank), 1) + 2), replace=False)
         block = np.zeros((n, d))
-        block[touched] = rng.standard_normal((len(touched), rank)) @ rng.standard_normal((rank, d))
+        left, right = rng.standard_normal((len(touched), rank)), rng.standard_normal((rank, d))
+        block[touched] = product(left, right)
         if rng.uniform() < 0.05:
             block[:] = 0
         columns.append(block)
@@ -81,12 +86,12 @@ def joints(rng: np.random.Generator, n: int, p: int) -> Array:
     """G of p constraints; some follow from others, and one may be nothing."""
     G = rng.standard_normal((n, p)) * (rng.uniform(size=(n, p)) < 0.5)
     if p > 1 and rng.uniform() < 0.5:
-        G[:, -1] = G[:, :-1] @ rng.integers(-2, 3, p - 1)
+        G[:, -1] = product(G[:, :-1], rng.integers(-2, 3, p - 1))
     return G
 
 
 def planted(number: int) -> tuple[Any, fclib.Solution, Array | None]:
-    """Problem `number`, a solution of it, and a guess."""
+    """Problem `number`, a solution of it, and a guess: the same digits on every processor."""
     rng = np.random.default_rng([number, 2026])
     rolling = bool(rng.integers(2))
     d = int(rng.choice([3, 5] if rolling else [2, 3]))
@@ -101,11 +106,11 @@ def planted(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     H, G = directions(rng, n, d, nc), joints(rng, n, p)
     impulse = unit * r.ravel()
     lam, f = unit * rng.standard_normal(p), unit * rng.standard_normal(n)
-    v = (H @ impulse + G @ lam + f) / mass
-    mixed = {"G": G, "b": -G.T @ v} if p else {}
+    v = (product(H, impulse) + product(G, lam) + f) / mass
+    mixed = {"G": G, "b": -product(G.T, v)} if p else {}
     kind: Any = fclib.GlobalRollingProblem if rolling else fclib.GlobalProblem
     problem: Any = kind(
-        spacedim=d, M=np.diag(mass), H=H, f=f, w=u.ravel() - H.T @ v, **law, **mixed
+        spacedim=d, M=np.diag(mass), H=H, f=f, w=u.ravel() - product(H.T, v), **law, **mixed
     )
     solution = fclib.Solution(v=v, u=u.ravel(), r=impulse, l=lam if p else None)
     guess = [None, None, impulse * (1 + 1e-3 * rng.standard_normal(d * nc)),

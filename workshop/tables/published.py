@@ -180,11 +180,13 @@ def of_sets(
     """The parts of the page on sets."""
     yield from ("## What was run?", "")
     yield from prose(
-        "`planned` is the number of runs of the whole campaign, as it was last begun. `runs` is "
-        "smaller if solvers failed, because the renumbered copies of such runs are left out. It is "
-        "also smaller if the campaign was cut. The order of a campaign makes each first part of "
-        "it balanced over the families. `load` is the load of the machine when a run began. If it "
-        "is above the number of cores, times are longer than on a quiet machine."
+        "`planned` is the number of runs that the last command of the campaign asked for. `runs` "
+        "counts those of all its commands. So it is larger than `planned` if earlier commands "
+        "asked for other problems or solvers. It is smaller if solvers failed, because the "
+        "renumbered copies of such runs are left out. It is also smaller if the campaign was cut. "
+        "The order of a campaign makes each first part of it balanced over the families. `load` is "
+        "the load of the machine when a run began. If it is above the number of cores, times are "
+        "longer than on a quiet machine."
     )
     yield from table("published-parts", [part_row(n, own) for n, own in groups.items()],
                      "Published runs", "")  # fmt: skip

@@ -55,22 +55,28 @@ bool all_finite(const ContactVector<D>& x) {
   return finite;
 }
 
-/// Damped Newton on `function(r, jacobian)`. The function returns Phi. If jacobian is not null, it
-/// fills in an element of its generalised Jacobian. Phi is zero up to rounding at accuracy times
-/// `size`.
+/// Phi near a point: an element of its generalised Jacobian, and the size of what it is the
+/// difference of. Rounding in Phi is in proportion to this size.
 template <int D>
-bool damped_newton(
-    FunctionRef<ContactVector<D>(const ContactVector<D>&, ContactMatrix<D>*)> function, double size,
-    double accuracy, int max_iterations, ContactVector<D>& r) {
+struct Linearised {
+  ContactMatrix<D> jacobian;
+  double size;
+};
+
+/// Damped Newton on `function(r, near)`. The function returns Phi. If near is not null, it fills it
+/// in. Phi is zero up to rounding at accuracy times its size.
+template <int D>
+bool damped_newton(FunctionRef<ContactVector<D>(const ContactVector<D>&, Linearised<D>*)> function,
+                   double accuracy, int max_iterations, ContactVector<D>& r) {
   constexpr int max_halvings = 12;
   constexpr double sufficient = 1e-4;  // share of the decrease that the model promises
   constexpr double rounding = 1e-12;   // if no step reduces Phi and it is below this, Phi is zero
   ContactVector<D> x = r;
-  ContactMatrix<D> jacobian;
-  ContactVector<D> phi = function(x, &jacobian);
+  Linearised<D> near;
+  ContactVector<D> phi = function(x, &near);
   double norm = part_norm<D>(phi.data());
-  for (int k = 0; k < max_iterations && norm > accuracy * size; ++k) {
-    const ContactMatrix<D> inverted = inverse<D>(jacobian);
+  for (int k = 0; k < max_iterations && norm > accuracy * near.size; ++k) {
+    const ContactMatrix<D> inverted = inverse<D>(near.jacobian);
     const ContactVector<D> step = inverted * phi;
     double length = 1;
     bool falls = false;
@@ -82,10 +88,10 @@ bool damped_newton(
       if (falls) x = trial;
     }
     if (!falls) break;
-    phi = function(x, &jacobian);
+    phi = function(x, &near);
     norm = part_norm<D>(phi.data());
   }
-  if (!(norm <= std::max(accuracy, rounding) * size)) return false;
+  if (!(norm <= std::max(accuracy, rounding) * near.size)) return false;
   r = x;
   return true;
 }
@@ -110,7 +116,8 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
     constexpr int size = Cone::size(g);
     double trace = 0;
     for (int k = at; k < at + size; ++k) trace += a(k, k);
-    for (int k = at; k < at + size; ++k) steps[k] = size / trace;
+    // no reaction moves a group without trace: any step serves
+    for (int k = at; k < at + size; ++k) steps[k] = trace == 0 ? steps[0] : size / trace;
   });
   for (int k = 0; k < D; ++k) {
     if (!(steps[k] > 0) || !std::isfinite(steps[k])) return false;
@@ -121,20 +128,38 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
       free(row, col) = (row == col ? 1.0 : 0.0) - steps[row] * a(row, col);
     }
   }
-  const auto function = [&](const Vec& x, Mat* jacobian) -> Vec {
+  Vec scaled;
+  for (int k = 0; k < D; ++k) scaled[k] = steps[k] * b[k];
+  using Near = detail::Linearised<D>;
+  const auto function = [&](const Vec& x, Near* near) -> Vec {
     const Vec u = detail::affine<D>(a, x, b);
     Vec z;
     for (int k = 0; k < D; ++k) z[k] = x[k] - steps[k] * u[k];
-    if (jacobian != nullptr) *jacobian = detail::one_less<D>(alart_curnier_jacobian(cone, z), free);
-    Vec phi = alart_curnier_projection(cone, z);
-    for (int k = 0; k < D; ++k) phi[k] = x[k] - phi[k];
+    const Vec projected = alart_curnier_projection(cone, z);
+    Vec phi;
+    for (int k = 0; k < D; ++k) phi[k] = x[k] - projected[k];
+    if (near == nullptr) return phi;
+    near->jacobian = detail::one_less<D>(alart_curnier_jacobian(cone, z), free);
+    // x and R b; but of a group outside its disk only the direction counts
+    const double normal = std::abs(x[0]) + std::abs(scaled[0]);
+    double squares = normal * normal;
+    for_each_group<Cone>([&](auto g) {
+      constexpr int at = Cone::start(g);
+      constexpr int size = Cone::size(g);
+      double share = part_norm<size>(&x[at]) + part_norm<size>(&scaled[at]);
+      const bool inside = part_norm<size>(&z[at]) <= cone.coefficient(g) * z[0];
+      if (!inside) share = std::min(share, cone.coefficient(g) * normal);
+      squares += share * share;
+      if (!inside) return;
+      for (int k = at; k < at + size; ++k) {
+        if (a(k, k) == 0) near->jacobian(k, k) = 1;  // a row of zeros: Phi_k depends on no r
+      }
+    });
+    near->size = std::sqrt(squares);
     return phi;
   };
-  Vec scaled;
-  for (int k = 0; k < D; ++k) scaled[k] = steps[k] * b[k];
-  const double size = part_norm<D>(r.data()) + part_norm<D>(scaled.data());
   const Vec before = r;
-  if (!detail::damped_newton<D>(function, size, accuracy, max_iterations, r)) return false;
+  if (!detail::damped_newton<D>(function, accuracy, max_iterations, r)) return false;
   r = cone.project(r);  // rounding may have left the cone
   if (detail::all_finite<D>(r)) return true;
   r = before;
@@ -179,7 +204,8 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
     for (int k = 1; k < D; ++k) result[k] = part * s[k];
     return result;
   };
-  const auto function = [&](const Vec& reaction, Mat* jacobian) -> Vec {
+  const double size = part_norm<D>(r.data()) + scale * part_norm<D>(b.data());
+  const auto function = [&](const Vec& reaction, detail::Linearised<D>* near) -> Vec {
     Vec x = reaction;
     x[0] *= mu;
     Vec y = detail::affine<D>(a, reaction, b);
@@ -192,7 +218,8 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
     const Vec squares = detail::affine<D>(product_x, x, square_y);
     Vec phi = root(squares);
     for (int k = 0; k < D; ++k) phi[k] = x[k] + y[k] - phi[k];
-    if (jacobian != nullptr) {
+    if (near != nullptr) {
+      near->size = size;
       // smoothed by what is negligible beside Phi, so that the root has an inverse
       Vec smooth = squares;
       double square = 0;
@@ -207,18 +234,17 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
         y_jacobian(0, col) = y_jacobian(0, col) / mu + (sliding > 0 ? slid / sliding : 0.0);
       }
       // (I - divided L_x) diag(mu, 1, 1) + (I - divided L_y) dy/dr
-      *jacobian = detail::one_less<D>(divided, product_y) * y_jacobian;
+      near->jacobian = detail::one_less<D>(divided, product_y) * y_jacobian;
       const Mat by_x = detail::one_less<D>(divided, product_x);
       for (int col = 0; col < D; ++col) {
         const double unit = col == 0 ? mu : 1.0;
-        for (int row = 0; row < D; ++row) (*jacobian)(row, col) += unit * by_x(row, col);
+        for (int row = 0; row < D; ++row) near->jacobian(row, col) += unit * by_x(row, col);
       }
     }
     return phi;
   };
   Vec x = r;
-  const double size = part_norm<D>(r.data()) + scale * part_norm<D>(b.data());
-  if (!detail::damped_newton<D>(function, size, accuracy, max_iterations, x)) return false;
+  if (!detail::damped_newton<D>(function, accuracy, max_iterations, x)) return false;
   x = cone.project(x);
   if (!detail::all_finite<D>(x)) return false;
   r = x;

@@ -21,17 +21,20 @@ double round_coefficient(double mu, double mu_s, Eigen::Ref<Eigen::Vector3d> e) 
   return 1;
 }
 
-/// The diagonal of W~ for the components that E takes away: the mean of the contact; else 0.
+/// The diagonal of W~ for the components that E takes away: the mean of what E leaves of the
+/// contact; else 0.
 Vector own_diagonal(const Matrix& W, const Vector& scale) {
   constexpr Eigen::Index d = 4;
   Vector diagonal = Vector::Zero(scale.size());
   for_each_entry(W, [&](Index row, Index col, double value) {
-    if (row == col) diagonal[row] += value;
+    if (row == col) diagonal[row] += scale[row] * value * scale[row];
   });
   Vector result = Vector::Zero(scale.size());
   for (Eigen::Index row = 0; row < scale.size(); ++row) {
     if (scale[row] != 0) continue;
-    const double mean = diagonal.segment<d>(row - row % d).mean();
+    const Eigen::Index first = row - row % d;
+    const double kept = static_cast<double>((scale.segment<d>(first).array() != 0).count());
+    const double mean = diagonal.segment<d>(first).sum() / kept;
     result[row] = mean > 0 ? mean : 1;
   }
   return result;

@@ -46,28 +46,26 @@ interior point, shorter steps   : interior_point      law=coulomb from=nothing  
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
 # a proof is found at once or not at all, and spares what follows (Squeezed/0000)
 no solution?                    : no_solution                                          limit=60
-# cheap beside what follows (a published run of Aqueduct_rr9118/0002 ended in it)
-interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
-# if it converges, it does from nothing as well; slower than the proximal point on rolling contacts
-# (PegInHole/0033)
+# if it converges, it does from nothing as well (Pile/0009 to 1e-4); slower than the proximal point on
+# rolling contacts (PegInHole/0033)
 semismooth newton               : semismooth_newton   from=nothing law=coulomb function=fischer_burmeister most_flops=100 limit=200
 # light bodies beside heavy ones, angles beside lengths: a hand whose fingers stand at their limits
 # (talos_full_v2 of example-robot-data, steps 0, 4, 5, 10, 16)
 own units                       : own_units           range=1e6
 # if most bodies rest: reactions that hold them are found by convex problems, with all that creep
 held bodies                     : held_bodies         at_least=100                     creep=0
-# 103539
+# 101711
 proximal point                  : proximal_point      from=best                        limit=200
 # slow, but cheaper than the path that follows (drakehard-sap-0140)
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
 # to its end, however often it folds (LowWall/0032)
 homotopy                        : homotopy                                             smoothing=0.3 limit=20000
-# contacts that wedge each other: few enough for dense tableaux (103717; then 100400, 100791)
+# contacts that wedge each other: few enough for dense tableaux (103717; then 100791, 103554)
 pivoting                        : pivoting            at_most=20                       edges=4 tries=60
 pivoting                        : pivoting            at_most=8                        edges=16 tries=40
 # 102888
 random starts                   : random_starts       at_most=12                       tries=200
-# the last resort (103503)
+# the last resort (LowWall/0034)
 proximal point                  : proximal_point      from=best                        wander=true limit=1600
 )";
 

@@ -15,6 +15,7 @@
 // (linalg/colouring.hpp), with u^a from the row of W, and the order of the contacts is not the
 // given one.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <random>
@@ -60,6 +61,8 @@ struct Options : SweepOptions {
 
 /// u = W r + q removes the rounding of the updates of u at least this often [sweeps].
 constexpr std::int64_t refresh_interval = 1000;
+/// ... and after so many sweeps if there is a guess: that of a large one is large.
+constexpr std::array<std::int64_t, 2> first_refreshes{10, 100};
 
 template <class Cone>
 Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
@@ -69,6 +72,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   problem.velocity(r, u);
   if (best.report(0, r, u)) return best.outcome(r);
 
+  const bool guessed = (r.array() != 0).any();
   Sweeps<Cone> contacts(problem, options.threads);
   LocalStep<Cone> step = options.local_step<Cone>();
   step.relaxation = options.relaxation;
@@ -91,7 +95,9 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
       }
     });
 
-    if (sweep % refresh_interval == 0) problem.velocity(r, u);
+    const bool first =
+        guessed && std::count(first_refreshes.begin(), first_refreshes.end(), sweep) > 0;
+    if (first || sweep % refresh_interval == 0) problem.velocity(r, u);
     const std::int64_t count = sweep - best.iterations();
     if (!schedule.due(sweep)) {
       if (best.due(count) && best.glance(count, r)) return best.outcome(r, contacts.cpu_s());

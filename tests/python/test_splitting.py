@@ -63,6 +63,26 @@ def test_a_rolling_contact_is_solved_in_each_sweep() -> None:
     assert by_newton.iterations < projected.iterations / 10
 
 
+# a rolling velocity over W_RR is much more than the reaction ever is
+def test_fast_rolling_of_what_hardly_moves_hides_no_error() -> None:
+    problem, r = planted_rolling(5, 1, nc=6)
+    usual = converged(problem, "nsgs", 1e-10)
+    W = dense(problem.W)
+    u = W @ r + problem.q
+    slow = np.tile([1, 1, 1, 1e-6, 1e-6], problem.nc)
+    W = slow[:, None] * W * slow
+    result = converged(problem.replace(W=W, q=u - W @ r), "nsgs", 1e-10)
+    assert result.iterations <= usual.iterations
+
+
+@pytest.mark.parametrize("size", [1e6, 1e12])
+def test_a_guess_that_is_far_too_large_costs_few_sweeps(size: float) -> None:
+    problem = planted_local(1).problem
+    cold = converged(problem, "nsgs")
+    result = converged(problem, "nsgs", guess=np.full(problem.m, size))
+    assert result.iterations < cold.iterations + 20
+
+
 def test_newton_takes_the_sweeps_of_the_exact_solver() -> None:
     exact = fclib.solve(packing(), "nsgs", 1e-9)
     for local_solver in ("alart-curnier", "hybrid"):

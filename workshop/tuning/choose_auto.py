@@ -251,17 +251,6 @@ def moved(number: int, before: int, **rules: object) -> Callable[[list[str]], li
     return change
 
 
-def after_held(stages: Sequence[str]) -> Callable[[list[str]], list[str]]:
-    """The change that takes stages to the place behind "held bodies"."""
-
-    def change(lines: list[str]) -> list[str]:
-        rest = [line for line in lines if name_of(line) not in stages]
-        at = place(rest, "held bodies") + 1
-        return [*rest[:at], *(lines[place(lines, name)] for name in stages), *rest[at:]]
-
-    return change
-
-
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
     """The change that puts a stage before all others of islands."""
     return lambda lines: [
@@ -370,13 +359,9 @@ def changes(lines: list[str]) -> list[Change]:
         result.append(Change(f"{names[near]}: before {later}", names[near], change))
     change = moved(near, place(lines, longer))
     result.append(Change(f"{names[near]}: before {longer}", first, change))
-    # each of them, then both
-    late = ("interior point, smoothed", "semismooth newton")
     after = place(lines, "held bodies") + 1
-    for name in late:
-        change = moved(place(lines, name), after)
-        result.append(Change(f"{name}: after held bodies", name, change))
-    result.append(Change(f"{' and '.join(late)}: after held bodies", late[0], after_held(late)))
+    change = moved(place(lines, "semismooth newton"), after)
+    result.append(Change("semismooth newton: after held bodies", "semismooth newton", change))
     path = place(lines, "homotopy")
     for value in (1500, 5000):
         result.append(Change(f"homotopy: limit={value}", "homotopy", with_rules(path, limit=value)))
@@ -384,7 +369,7 @@ def changes(lines: list[str]) -> list[Change]:
     for function in ("natural_map", "alart_curnier"):
         change = with_rules(newton, function=function)
         result.append(Change(f"semismooth newton: function={function}", names[newton], change))
-    for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):
+    for earlier in ("interior point, shorter steps", "held bodies"):
         for value in (200, 400):
             change = moved(middle, place(lines, earlier), limit=value)
             name = f"proximal point before {earlier}: limit={value}"

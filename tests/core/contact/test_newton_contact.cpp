@@ -68,6 +68,37 @@ TEST(NewtonContact, alart_curnier_solves_rolling_contacts) {
   EXPECT_GT(solved, 800);
 }
 
+/// A planar contact that slides and rolls at its limits: 1 of W_NN, `rolling` of W_RR.
+void expect_rolling(double rolling) {
+  const Rolling<3> cone(0.5, 0.05);
+  ContactMatrix<3> a;
+  a << 1, 0.4, 0, 0.4, 2, 0, 0, 0, rolling;
+  const ContactVector<3> exact(1.25, -0.625, 0.0625);
+  const ContactVector<3> u(0, 0.8, -1);
+  const ContactVector<3> b = u - a * exact;
+  ContactVector<3> r = ContactVector<3>::Zero();
+  ASSERT_TRUE(newton_alart_curnier(a, cone, b, 1e-15, 20, r)) << rolling;
+  EXPECT_LT((r - exact).norm(), 1e-14) << rolling;
+}
+
+// a rolling velocity over W_RR is much more than the reaction ever is
+TEST(NewtonContact, fast_rolling_of_what_hardly_moves_hides_no_error) {
+  for (const double rolling : {1.0, 1e-4, 1e-8, 1e-12, 1e-16, 1e-100}) expect_rolling(rolling);
+}
+
+TEST(NewtonContact, a_group_that_no_reaction_moves_is_solved) { expect_rolling(0); }
+
+// a point mass: it has no rolling at all
+TEST(NewtonContact, a_group_without_velocity_keeps_its_reaction) {
+  const Rolling<3> cone(0.5, 0.05);
+  ContactMatrix<3> a;
+  a << 1, 0.4, 0, 0.4, 2, 0, 0, 0, 0;
+  ContactVector<3> r(1, 0, 0.01);
+  ASSERT_TRUE(newton_alart_curnier(a, cone, {-1, 0.1, 0}, 1e-15, 20, r));
+  EXPECT_EQ(r[2], 0.01);
+  EXPECT_LT((a * r + ContactVector<3>(-1, 0.1, 0)).norm(), 1e-15);
+}
+
 TEST(NewtonContact, a_block_of_zeros_is_refused) {
   const ContactMatrix<3> zero = ContactMatrix<3>::Zero();
   const Coulomb<3> cone(0.5);

@@ -143,8 +143,8 @@ class Plan:
             raise ValueError("a plan needs a number of problems or of steps")
         if self.chosen is not None and (self.count is not None or self.select != "every"):
             raise ValueError(
-                f"these problems of {self.collection} are named, or chosen by a list already: no count"
-                " and no selection applies to them"
+                f"these problems of {self.collection} are named, or chosen by a list already:"
+                " no count and no selection applies to them"
             )
 
     @property

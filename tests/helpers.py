@@ -50,7 +50,7 @@ def needs_siconos_mechanics() -> None:
         pytest.skip("Siconos has no mechanics with Bullet, or its Python has no SciPy")
 
 
-# ---- the same digits on every processor: sums of BLAS, which NumPy calls, depend on it
+# ---- the same digits on every processor: NumPy's products are BLAS's, whose sums depend on it
 
 
 def product(a: Array, b: npt.NDArray[Any]) -> Array:

@@ -91,6 +91,7 @@ bool damped_newton(FunctionRef<ContactVector<D>(const ContactVector<D>&, Lineari
     phi = function(x, &near);
     norm = part_norm<D>(phi.data());
   }
+  if (!std::isfinite(near.size)) return false;  // squares overflow: any Phi would pass
   if (!(norm <= std::max(accuracy, rounding) * near.size)) return false;
   r = x;
   return true;

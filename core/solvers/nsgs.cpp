@@ -61,7 +61,7 @@ struct Options : SweepOptions {
 
 /// u = W r + q removes the rounding of the updates of u at least this often [sweeps].
 constexpr std::int64_t refresh_interval = 1000;
-/// ... and after so many sweeps if there is a guess: that of a large one is large.
+/// ... and after each of these sweeps if there is a guess: a large one leaves much rounding.
 constexpr std::array<std::int64_t, 2> first_refreshes{10, 100};
 
 template <class Cone>

@@ -5,7 +5,10 @@ Problems are made from bodies with a planted solution, so that each of them has 
 
 from __future__ import annotations
 
+import os
 import pickle
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -744,6 +747,22 @@ WEDGED = {  # stages that solve a few contacts of high friction, and problems of
     "pivoting": [438, 1190, 2319, 2890],
     "random starts": [1031, 1164],
 }
+
+
+def test_planted_problems_have_the_same_digits_with_another_blas() -> None:
+    code = """
+import fclib, planted_judge
+print(*[fclib.digest(planted_judge.planted(k)[0]) for k in range(9)])"""
+    told = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1]), **other},
+            stdout=subprocess.PIPE,
+            check=True,
+        ).stdout
+        for other in ({}, {"OPENBLAS_CORETYPE": "Prescott"})
+    }
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize(("stage", "number"), [(s, n) for s in WEDGED for n in WEDGED[s]])

@@ -14,7 +14,7 @@ import fclib
 from ball_judge import judge
 from fclib import _laws, analysis
 from fclib.analysis._certificate import _at_least_roots, _outside
-from helpers import SPIN_LAWS, as_global, dense
+from helpers import SPIN_LAWS, as_global, converged, dense
 from helpers import planted_spin as planted
 
 Array = npt.NDArray[np.float64]
@@ -218,3 +218,12 @@ def test_an_ellipsoid_that_is_a_segment_or_a_disk_is_analysed(mu: float, mu_s: f
     assert found.reactions.verdict != "unique"
     alone = problem.replace(W=np.eye(4), q=problem.q[:4], mu=problem.mu[:1], mu_s=problem.mu_s[:1])
     assert analysis.analyze(alone, time_limit=1.0).existence.verdict[:6] == "exists"
+
+
+def test_spin_without_a_limit_may_have_any_unit() -> None:
+    """W_SS is out of all proportion, and mu_s = 0: the spin takes no part."""
+    W = np.array([[1, 0.3, 0.2, 0], [0.3, 1, 0.1, 0], [0.2, 0.1, 1.5, 0], [0, 0, 0, 1e12]])
+    r, u = np.array([1, -0.3, -0.4, 0]), np.array([0, 0.6, 0.8, 1e5])
+    problem = fclib.LocalSpinProblem(spacedim=4, W=W, q=u - W @ r, mu=[0.5], mu_s=[0.0], coupled=1)
+    result = converged(problem, "nsgs", max_iterations=10)
+    np.testing.assert_allclose(result.solution.r, r, atol=1e-8)

@@ -99,6 +99,14 @@ TEST(NewtonContact, a_group_without_velocity_keeps_its_reaction) {
   EXPECT_LT((a * r + ContactVector<3>(-1, 0.1, 0)).norm(), 1e-15);
 }
 
+TEST(NewtonContact, reactions_whose_squares_overflow_are_refused) {
+  const Rolling<3> cone(0.5, 0.05);
+  const ContactMatrix<3> a = 1e-200 * ContactMatrix<3>::Identity();
+  ContactVector<3> r = ContactVector<3>::Zero();
+  EXPECT_FALSE(newton_alart_curnier(a, cone, {-1, 0, 0}, 1e-15, 20, r));
+  EXPECT_EQ(r, (ContactVector<3>::Zero()));
+}
+
 TEST(NewtonContact, a_block_of_zeros_is_refused) {
   const ContactMatrix<3> zero = ContactMatrix<3>::Zero();
   const Coulomb<3> cone(0.5);

@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 BUILD := build
 SECONDS := 60
 BUDGET ?= 10min
-CAMPAIGNS ?= rt444 scaling faf2018
+CAMPAIGNS ?= rt444 scaling
 # processes of tests: one more than cores, since some tests wait
 JOBS ?= $(shell echo $$(( $$(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1 )))
 

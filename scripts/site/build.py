@@ -66,6 +66,7 @@ MENU = {
         "measurement",
         "published-runs",
         "published-results",
+        "published-2018",
         "report",
     ],
     "Interfaces": [

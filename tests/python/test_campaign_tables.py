@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fclib import bench
-from fclib.bench import profiles
+from fclib.bench import comparison, profiles
 from workshop.tables import campaign as tables
 
 pytest.importorskip("mujoco", reason="simulates")
@@ -99,6 +99,26 @@ def test_auto_beside_the_fastest_of_siconos(store: Path) -> None:
     assert float(figures["geometric mean of CPU ratios"]) == pytest.approx(mean, abs=1e-3)
     assert float(figures["worst CPU ratio"]) == pytest.approx(max(ratios), abs=1e-3)
     assert figures["solved by both from 100 contacts on"] == 0
+
+
+def test_what_siconos_does_not_take_is_not_compared() -> None:
+    """Of what neither solves, nothing; of what one alone solves, that it does."""
+    inf, nan = math.inf, math.nan
+    values = np.array(
+        #  auto, two of Siconos, another
+        [[1, 2, 4, 9], [1, inf, inf, 9], [inf, inf, 3, 9], [1, nan, nan, 9], [nan, 1, 1, 9]],
+        dtype=float,
+    )
+    instances = tuple(
+        comparison.Instance(str(k), str(k), "Chain", 100, 1e-8, 10.0) for k in range(len(values))
+    )
+    solvers = ("auto (1)", "siconos:nsgs", "siconos:prox", "scs:aclm")
+    costs = comparison.Costs(instances, solvers, values, "cpu_s")
+    figures = {row["figure"]: row["value"] for row in tables.beside_siconos(costs)}
+    assert (figures["problems"], figures["solved by both"]) == (3, 1)
+    assert figures["solved by auto alone"] == figures["solved by one of Siconos alone"] == 1
+    assert figures["geometric mean of CPU ratios"] == "0.500"
+    assert tables.beside_siconos(costs.chosen(solvers[:1])) == []
 
 
 def test_solvers_beside_those_of_the_same_family(store: Path) -> None:

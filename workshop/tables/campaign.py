@@ -27,7 +27,7 @@ import statistics
 import subprocess
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -50,6 +50,7 @@ COARSE = "doubles are too coarse"  # how the message begins if rounding ends a s
 LARGE = 100  # contacts from which on the time is that of the solver, not that of the call
 SHORT = 50e-6  # [s] below this the call is much of the time
 SICONOS = "siconos:"
+HINDSIGHT = "`auto` beside the fastest solver of Siconos, picked in hindsight"
 # each solver, with its options, and the one of Siconos beside it; "" if there is none
 PAIRS = (
     ("nsgs", "nsgs"),
@@ -209,7 +210,16 @@ def compared(store: Path, _: argparse.Namespace) -> list[Table]:
                     "within 10x": f"{100 * ten:.0f} %",
                 }
             )
-    families = [
+    families = family_rows(whole, campaign.published_means(store))
+    return [
+        Table(solvers, "Campaign {name}: the solvers", note),
+        Table(families, "Campaign {name}: the fastest solver of each problem", note, "-families"),
+    ]
+
+
+def family_rows(costs: profiles.Costs, published: Mapping[tuple[str, float], float]) -> list[Row]:
+    """The fastest solver of each problem, by family and tolerance, beside published means."""
+    return [
         {
             "family": row["family"],
             "problems": row["problems"],
@@ -220,11 +230,7 @@ def compared(store: Path, _: argparse.Namespace) -> list[Table]:
             "unsolved": row["unsolved"],
             "most often the fastest": short(row["most often fastest"]),
         }
-        for row in profiles.families(whole, campaign.published_means(store))
-    ]
-    return [
-        Table(solvers, "Campaign {name}: the solvers", note),
-        Table(families, "Campaign {name}: the fastest solver of each problem", note, "-families"),
+        for row in profiles.families(costs, published)
     ]
 
 
@@ -291,6 +297,8 @@ def hindsight_figures(ours: Times, best: Times, contacts: npt.NDArray[np.int64])
         ("solved by auto", int(np.isfinite(ours).sum())),
         ("solved by one of Siconos", int(np.isfinite(best).sum())),
         ("solved by both", len(ratios)),
+        ("solved by auto alone", int((np.isfinite(ours) & ~both).sum())),
+        ("solved by one of Siconos alone", int((np.isfinite(best) & ~both).sum())),
     ]
     if len(ratios):
         found += [
@@ -315,15 +323,28 @@ def hindsight(store: Path, _: argparse.Namespace) -> list[Table]:
     """`auto` beside the fastest solver of Siconos, picked after the runs for each problem."""
     whole, rows = costs_of(store)
     part = whole.at(whole.tolerances[-1])
-    theirs = [k for k, name in enumerate(part.solvers) if name.startswith(SICONOS)]
-    if "auto" not in part.solvers or not theirs:
+    table = beside_siconos(part)
+    if not table:
         raise SystemExit(f"{store}: has no runs of auto, or none of Siconos")
-    ours = part.values[:, part.solvers.index("auto")]
-    best = comparison.least(part.values[:, theirs])
+    return [Table(table, HINDSIGHT, f"{profiles.caption(part, rows)}.")]
+
+
+def beside_siconos(costs: profiles.Costs) -> list[Row]:
+    """The figures of `auto` and of the fastest solver of Siconos; none if one has not run.
+
+    On the problems that `auto` and some solver of Siconos take.
+    """
+    names = [short(name) for name in costs.solvers]
+    theirs = [k for k, name in enumerate(names) if name.startswith(SICONOS)]
+    if "auto" not in names or not theirs:
+        return []
+    own = names.index("auto")
+    taken = costs.there[:, own] & costs.there[:, theirs].any(axis=1)
+    part = costs.on_instances(np.flatnonzero(taken).tolist())
     contacts = np.array([one.nc for one in part.instances])
-    table = hindsight_figures(ours, best, contacts)
-    title = "`auto` beside the fastest solver of Siconos, picked in hindsight"
-    return [Table(table, title, f"{profiles.caption(part, rows)}.")]
+    return hindsight_figures(
+        part.values[:, own], comparison.least(part.values[:, theirs]), contacts
+    )
 
 
 # ---- what ends the runs

@@ -1,21 +1,19 @@
 """The readable report of the published runs: its tables, its pictures and its page.
 
-    python -m workshop.tables.published
-    python -m workshop.tables.published --paper CURVES.csv --catalog FOLDER
+    python -m workshop.tables.published [--catalog FOLDER]
 
 It runs nothing. It reads the parts in results/ and writes docs/results/published-*.csv,
 docs/images/published-*.png and docs/published-results.md, which quotes them. A set is the name of
 its parts, or chosen from such runs. What nothing is published of is left out.
 
---paper has the curves of the comparison of 2018, as they were read from its figures: set,
-tolerance, limit_s, solver, tau, share. They are quoted beside ours, set by set. --catalog is a
-built collection (`fclib collection build ... --analyze`): it has the ranks and the conditioning.
+--catalog is a built collection (`fclib collection build ... --analyze`): it has the ranks and the
+conditioning.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
+import json
 import math
 import textwrap
 import time
@@ -36,6 +34,7 @@ from fclib.bench.table import Table
 from fclib.collections import set_index
 from fclib.results.boards import CHOSEN_FROM, PART_OF, at_one_limit, by_name, digests_of, sources
 from workshop.tables import _results
+from workshop.tables.campaign import HINDSIGHT, beside_siconos
 
 Row: TypeAlias = dict[str, Any]
 
@@ -45,20 +44,6 @@ SHOWN: Final = 5  # families with failures that a row names
 PAGE: Final = _results.ROOT / "docs" / "published-results.md"
 IMAGES: Final = _results.ROOT / "docs" / "images"
 SEQUENCES: Final = "sequences"  # the set whose runs are along sequences
-PAPER: Final = "faf2018"  # the set of the comparison of 2018
-# families as the campaign calls them, and as the curves of the paper do
-SETS: Final = {"Aqueduct_PR": "AqueducPR", "BoxesStack": "BoxesStack1"}
-# solvers of the paper, and Siconos' own implementation of the same method
-OWN: Final = {
-    "NSGS-AC": "siconos:nsgs",
-    "NSGS-FP-VI-UPK tol 1e-14": "siconos:nsgs-projection",
-    "EG-VI-UPK": "siconos:vi-eg",
-    "NSN-AC": "siconos:nsn-ac",
-    "PPA-NSN-AC-GP adaptive": "siconos:prox",
-    "TRESCA-NSGS-FP-VI-UPK": "siconos:tfp",
-    "ACLM-NSGS-FP-VI": "siconos:aclmfp",
-}
-BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
 CHOSEN: Final = CHOSEN_FROM.keys() - PART_OF.keys()
 # what favours a solver: how the problems of a set were taken, or an older version
 TAKEN: Final = {
@@ -85,6 +70,10 @@ EFFECTS: Final = {
 }
 
 
+BESIDE: Final = (
+    "A ratio is the CPU time of `auto` over that of the solver of Siconos that is the fastest on "
+    "the problem. Nobody knows before which one that is."
+)
 RATIO: Final = "cold CPU / warm CPU"
 WARM: Final = (
     "Each step of the simulations in `sequences` is solved from nothing (cold), and from the "
@@ -119,7 +108,6 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--parts", type=Path, help="folder of the parts")
-    parser.add_argument("--paper", type=Path, help="curves of the comparison of 2018")
     parser.add_argument("--catalog", type=Path, help="a built collection, with ranks")
     own = parser.parse_args()
     folder = own.parts or results.folder()
@@ -138,8 +126,6 @@ def main() -> None:
         elif one := set_of(name, shards):
             sets.append(one)
     page = [*of_sets(sets, groups, facts), *(["## Warm or cold?", "", *page] if page else [])]
-    if own.paper:
-        page += [part for one in sets if one.name == PAPER for part in of_paper(one, own.paper)]
     PAGE.write_text("\n".join([*HEAD, *page]).rstrip() + "\n", encoding="utf-8")
     print(PAGE)
 
@@ -227,6 +213,15 @@ def of_sets(
         yield from ("## Who fails where, and why?", "")
         yield from table("published-failures", failures, "What ends the runs that fail",
                          "Each solver on the problems that it has run and takes.")  # fmt: skip
+    for one in telling:
+        own = one.every.at(one.tolerances[-1])
+        if rows := beside_siconos(own):
+            note = f"Each problem of {one.name} weighs the same; limit {own.instances[0].limit:g} s"
+            yield from (f"## How does the default solver compare with Siconos on {one.name}?", "")
+            yield from prose(BESIDE)
+            yield from table(
+                f"published-{one.name}-siconos", rows, HINDSIGHT, f"{note}; {one.caption}."
+            )
     yield from ("## Which family of methods for which kind of problem?", "")
     yield from table("published-kinds", [row for one in telling for row in kind_rows(one)],
                      "The best of each family of methods, by kind of problem",
@@ -262,13 +257,21 @@ def caption_of(one: Set) -> str:
 
 
 def table(name: str, rows: Sequence[Row], title: str, note: str) -> list[str]:
-    """Store a table, and the line of the page that quotes it; nothing if it has no row."""
+    """Store a table, and the line of the page that quotes it; nothing if it has no row.
+
+    A table that says what it said before is left, with the commit that made it.
+    """
     if not rows:
         return []
     # sets have other families of methods, for example
     columns = list(dict.fromkeys(key for row in rows for key in row))
     whole = [{key: row.get(key, "") for key in columns} for row in rows]
-    _results.store(name, whole, title=title, note=note)
+    path = (_results.FOLDER / name).with_suffix(".csv")
+    about = path.with_suffix(".json")
+    known = json.loads(about.read_text(encoding="utf-8")) if about.is_file() else {}
+    same = known.get("title") == title and known.get("note") == note and path.is_file()
+    if not same or path.read_text(encoding="utf-8") != _results.table(columns, whole):
+        _results.store(name, whole, title=title, note=note)
     return [f"[Table: {title}](results/{name}.csv)", ""]
 
 
@@ -733,115 +736,6 @@ def warm_row(solver: str, own: Mapping[str, Mapping[str, Any]], mean: float) -> 
             for name in ("solved warm", "solved cold", "of")
         },
     }
-
-
-# ---- the comparison of 2018
-
-
-Curve: TypeAlias = list[tuple[float, float]]
-
-
-def curves_of(path: Path) -> dict[tuple[str, float], dict[str, Curve]]:
-    """The published curves: by set and tolerance, then by solver, the steps (tau, share)."""
-    found: dict[tuple[str, float], dict[str, Curve]] = defaultdict(lambda: defaultdict(list))
-    with path.open(newline="", encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            key = row["set"], float(row["tolerance"])
-            found[key][row["solver"]].append((float(row["tau"]), float(row["share"])))
-    return found
-
-
-def share_at(curve: Curve, taus: Array) -> Array:
-    """The shares of a step curve at some ratios."""
-    steps = np.array(sorted(curve))
-    place = np.searchsorted(steps[:, 0], taus, side="right") - 1
-    return np.asarray(np.where(place >= 0, steps[np.maximum(place, 0), 1], 0.0))
-
-
-def of_paper(one: Set, path: Path) -> list[str]:
-    """The curves of the paper beside ours, set by set."""
-    theirs = curves_of(path)
-    rows = []
-    lines = ["## How does the comparison of 2018 come out?", ""]
-    for (name, tol), own in sorted(theirs.items()):
-        family = next((ours for ours, known in SETS.items() if known == name), name)
-        part = one.every.at(tol)
-        part = part.on_instances(
-            k for k, instance in enumerate(part.instances) if instance.family == family
-        )
-        labels = [solver for solver in own if solver in part.solvers]
-        if not part.instances or len(labels) < 2:
-            continue
-        ours = part.chosen(labels)
-        there = np.flatnonzero(ours.there.all(axis=1))
-        if not len(there):
-            continue
-        ours = ours.on_instances(there.tolist())
-        taus = np.unique([tau for curve in own.values() for tau, _ in curve])
-        shares = profiles.performance_profile(ours.values, taus)
-        for k, solver in enumerate(labels):
-            apart = np.abs(shares[k] - share_at(own[solver], taus))
-            rows.append(
-                {
-                    "set": name,
-                    "tolerance": _results.power(tol),
-                    "solver": solver,
-                    "our problems": len(there),
-                    "largest distance": f"{apart.max():.2f}",
-                    "at": f"{taus[apart.argmax()]:.3g}",
-                    "chance alone, up to": f"{BAND / math.sqrt(len(there)):.2f}",
-                    "Siconos beside it": siconos(part, labels, solver, own[solver], taus),
-                }
-            )
-        picture = f"published-2018-{name}-{_results.power(tol)}"
-        beside(picture, f"{name} to {_results.power(tol)}", labels, taus, shares, own)
-        lines += image(picture, f"{name} to {_results.power(tol)}: the paper's curves and ours")
-    if not rows:
-        return []
-    note = (
-        "The curves of the paper (Acary, Bremond & Huber 2018) were read from its figures. `at` is"
-        " the ratio of the largest vertical distance. Siconos beside it: the same distance, if"
-        " Siconos' own implementation takes the place of ours."
-    )
-    return [*lines, *table("published-2018", rows, "The paper's curves and ours", note)]
-
-
-def siconos(part: Costs, labels: Sequence[str], solver: str, curve: Curve, taus: Array) -> str:
-    """The distance of the paper's curve, with Siconos' implementation in the place of ours."""
-    other = OWN.get(solver, "")
-    if other not in part.solvers:
-        return ""
-    chosen = part.chosen([other if name == solver else name for name in labels])
-    there = np.flatnonzero(chosen.there.all(axis=1))
-    if not len(there):
-        return ""
-    shares = profiles.performance_profile(chosen.on_instances(there.tolist()).values, taus)
-    return f"{np.abs(shares[labels.index(solver)] - share_at(curve, taus)).max():.2f}"
-
-
-def beside(
-    name: str,
-    title: str,
-    labels: Sequence[str],
-    taus: Array,
-    ours: Array,
-    theirs: Mapping[str, Curve],
-) -> None:
-    """Draw the paper's curves and ours in two fields with one legend."""
-    import matplotlib.pyplot as plt
-
-    with plt.rc_context(plots.STYLE):
-        drawn, fields = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True, layout="constrained")
-        for k, label in enumerate(labels):
-            style = plots.stroke(k)
-            fields[0].step(taus, share_at(theirs[label], taus), where="post", **style)
-            fields[1].step(taus, ours[k], where="post", label=label, **style)
-        for field, words in zip(fields, (f"{title}: the paper", "ours"), strict=True):
-            field.set(xscale="log", xlabel="ratio to the best", title=words, ylim=(0, 1.02))
-        fields[0].set_ylabel("share of problems")
-        drawn.legend(loc="outside right center")
-        drawn.savefig(IMAGES / f"{name}.png", dpi=100)
-        plt.close(drawn)
 
 
 if __name__ == "__main__":

@@ -442,20 +442,23 @@ def share_of(names: Sequence[Any], share: float) -> list[Any]:
 
 def published_means(store: str | Path) -> dict[tuple[str, float], float]:
     """Published means of the fastest solver, by family and tolerance, that campaigns quote."""
-    found = {}
     with Store(store, create=False) as opened:
-        for text in opened.texts():
-            try:
-                campaign = toml().loads(text)
-            except ValueError:
-                continue  # of another version, or edited
-            groups = campaign.get("problems", ())
-            for group in groups if isinstance(groups, list) else ():
-                if not isinstance(group, Mapping) or "published_mean" not in group:
-                    continue
-                tolerances = group.get("tolerances", campaign.get("tolerances", []))
-                for tol in tolerances if isinstance(tolerances, list) else [tolerances]:
-                    found[group.get("family", ""), float(tol)] = float(group["published_mean"])
+        return {key: mean for text in opened.texts() for key, mean in means_quoted(text).items()}
+
+
+def means_quoted(text: str) -> dict[tuple[str, float], float]:
+    """The published means that the text of a campaign quotes, by family and tolerance."""
+    try:
+        campaign = toml().loads(text)
+    except ValueError:
+        return {}  # of another version, or edited
+    found = {}
+    groups = campaign.get("problems", ())
+    for group in groups if isinstance(groups, list) else ():
+        if isinstance(group, Mapping) and "published_mean" in group:
+            tolerances = group.get("tolerances", campaign.get("tolerances", []))
+            for tol in tolerances if isinstance(tolerances, list) else [tolerances]:
+                found[group.get("family", ""), float(tol)] = float(group["published_mean"])
     return found
 
 

@@ -174,11 +174,12 @@ def test_what_explains_a_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.setattr(published_2018, "OWN", {"a": "theirs"})
 
-    def explained(ours: float, theirs: float, paper: float) -> str:
-        """By shares of problems on which each is the fastest."""
+    def explained(ours: float, theirs: float, paper: float, ran: int = 100) -> str:
+        """By shares of problems on which each is the fastest; theirs ran on some."""
         values = np.ones((count, 3))
         for column, share in ((0, ours), (2, theirs)):
             values[:, column] = np.where(np.arange(count) < share * count, 0.5, 2.0)
+        values[ran:, 2] = np.nan
         costs = comparison.Costs(instances, ("a", "b", "theirs"), values, "cpu_s")
         curve = [(1.0, paper), (1.5, paper)]
         taus = np.array([1.0, 1.5])
@@ -188,8 +189,12 @@ def test_what_explains_a_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     assert explained(0.2, 0.9, 0.85) == "the implementation"
     assert explained(0.2, 0.25, 0.9) == "the problems"
     assert explained(0.1, 0.5, 0.9) == "both"
+    assert explained(0.2, 0.9, 0.85, ran=5) == "not told apart"
     monkeypatch.setattr(published_2018, "OWN", {})
-    assert explained(0.1, 0.5, 0.9) == ""
+    assert explained(0.1, 0.5, 0.9) == "not told apart"
+    assert explained(0.5, 0.9, 0.55) == "chance"
+    count, instances = 5, instances[:5]
+    assert explained(0.2, 0.2, 0.2) == "too few problems"
 
 
 def test_a_chosen_set_has_the_runs_that_chose_it(

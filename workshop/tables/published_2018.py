@@ -15,7 +15,7 @@ import argparse
 import csv
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, TypeAlias
 
@@ -47,7 +47,9 @@ OWN: Final = {
     "ACLM-NSGS-FP-VI": "siconos:aclmfp",
 }
 BAND: Final = 1.36  # of Kolmogorov & Smirnov's 95 % band, times 1 / sqrt(n)
+WIDE: Final = 0.5  # a wider band tells nothing
 CHANCE, CODE, PROBLEMS, BOTH = "chance", "the implementation", "the problems", "both"
+FEW, OPEN = "too few problems", "not told apart"
 
 HEAD: Final = [
     "# The comparison of 2018, anew",
@@ -75,8 +77,8 @@ DISTANCES: Final = (
     "solver takes the place of ours, on our problems, and comes within the band of the paper's "
     f"curve, the reason is {CODE}. If it does not, and comes within the band of our curve, the "
     f"reason is {PROBLEMS} (or the machine): the program of the paper differs from the paper as "
-    f"ours does. If it comes within neither, the reason may be {BOTH}. An empty cell says that "
-    "Siconos' own solver has not run, so that they cannot be told apart."
+    f"ours does. If it comes within neither, the reason may be {BOTH}. If Siconos' own solver has "
+    f"not run on enough of our problems, they are {OPEN}."
 )
 
 
@@ -127,7 +129,7 @@ def page(one: Set, path: Path) -> list[str]:
         ]
         picture = f"published-2018-{name}-{_results.power(tol)}"
         title = f"{name} to {_results.power(tol)}"
-        beside(picture, title, labels, taus, shares, theirs)
+        published.draw(picture, beside(title, labels, taus, shares, theirs))
         pictures += image(picture, f"{title}: the curves of the paper, and ours")
     return [
         "## What was run?",
@@ -195,11 +197,15 @@ def distance(
         "chance alone, up to": f"{band(ours):.2f}",
         "Siconos to the paper": "",
         "Siconos to ours": "",
-        "explained by": CHANCE if apart.max() <= band(ours) else "",
+        "explained by": OPEN,
     }
+    if band(ours) > WIDE:
+        row["explained by"] = FEW
+    elif apart.max() <= band(ours):
+        row["explained by"] = CHANCE
     other = OWN.get(solver, "")
     both = complete(costs, [*labels, other]) if other in costs.solvers else None
-    if both is None or not both.instances:
+    if both is None or not both.instances or band(both) > WIDE:
         return row
     replaced = [other if label == solver else label for label in labels]
     siconos, mine = (
@@ -210,7 +216,7 @@ def distance(
     to_ours = float(np.abs(siconos - mine).max())
     row["Siconos to the paper"] = f"{to_paper:.2f}"
     row["Siconos to ours"] = f"{to_ours:.2f}"
-    if not row["explained by"]:
+    if row["explained by"] == OPEN:
         near = band(both)
         row["explained by"] = CODE if to_paper <= near else PROBLEMS if to_ours <= near else BOTH
     return row
@@ -223,33 +229,36 @@ def reasons(rows: Sequence[Row]) -> list[Row]:
         groups[row["explained by"]].append(float(row["largest distance"]))
     return [
         {
-            "explained by": reason or "not told apart",
+            "explained by": reason,
             "pairs of curves": len(groups[reason]),
             "largest distance in the median": float(np.median(groups[reason])),
         }
-        for reason in (CHANCE, CODE, PROBLEMS, BOTH, "")
+        for reason in (CHANCE, CODE, PROBLEMS, BOTH, OPEN, FEW)
         if groups[reason]
     ]
 
 
 def beside(
-    name: str, title: str, labels: Sequence[str], taus: Array, ours: Array, theirs: Curves
-) -> None:
-    """Draw the paper's curves and ours in two fields with one legend."""
-    import matplotlib.pyplot as plt
+    title: str, labels: Sequence[str], taus: Array, ours: Array, theirs: Curves
+) -> Callable[[Path], None]:
+    """What draws the paper's curves and ours, in two fields with one legend."""
 
-    with plt.rc_context(plots.STYLE):
-        drawn, fields = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True, layout="constrained")
-        for k, label in enumerate(labels):
-            style = plots.stroke(k)
-            fields[0].step(taus, share_at(theirs[label], taus), where="post", **style)
-            fields[1].step(taus, ours[k], where="post", label=label, **style)
-        for field, words in zip(fields, (f"{title}: the paper", "ours"), strict=True):
-            field.set(xscale="log", xlabel="ratio to the best", title=words, ylim=(0, 1.02))
-        fields[0].set_ylabel("share of problems")
-        drawn.legend(loc="outside right center")
-        drawn.savefig(published.IMAGES / f"{name}.png", dpi=100)
-        plt.close(drawn)
+    def drawing(folder: Path) -> None:
+        import matplotlib.pyplot as plt
+
+        with plt.rc_context(plots.STYLE):
+            drawn, fields = plt.subplots(1, 2, figsize=(8, 3.2), sharey=True, layout="constrained")
+            for k, label in enumerate(labels):
+                plots.steps(fields[0], taus, share_at(theirs[label], taus), k, label)
+                plots.steps(fields[1], taus, ours[k], k, label)
+            for field, words in zip(fields, (f"{title}: the paper", "ours"), strict=True):
+                field.set(xscale="log", xlabel="ratio to the best", title=words, ylim=(0, 1.02))
+            fields[0].set_ylabel("share of problems")
+            drawn.legend(*fields[1].get_legend_handles_labels(), loc="outside right center")
+            drawn.savefig(folder / "curves.png", dpi=150)
+            plt.close(drawn)
+
+    return drawing
 
 
 if __name__ == "__main__":

@@ -911,6 +911,7 @@ def test_one_form_of_a_problem_is_run(
         ({"problems": [{"set": "tiny", "form": "square"}]}, r"problems\[0\]\.form"),
         ({"problems": [{"set": "tiny", "form": "both"}]}, r"'both' is none of global, local"),
         ({"problems": [{"simulate": {}, "form": "both"}]}, r"'both' is none of global, local"),
+        ({"problems": [{"planted": {}, "form": "global"}]}, "planted problems are local"),
         ({"budget": "long"}, "budget"),
         ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
         ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),

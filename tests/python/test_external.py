@@ -761,13 +761,32 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
         f"#include <fclib_plugin.h>\n{solve} {{ (void)p, (void)r; return 0; }}\n"
         'extern "C" const fclib_plugin_about* fclib_plugin_describe() { throw 7; }\n'
     )
+    for name, body in {
+        "raises": 'throw std::runtime_error("no licence");',
+        "leaves": "std::exit(0);",
+        "aborts": "std::abort();",
+    }.items():
+        (folder / f"{name}.cpp").write_text(
+            "#include <fclib_plugin.h>\n#include <cstdlib>\n#include <stdexcept>\n"
+            f"struct Global {{ Global() {{ {body} }} }};\nstatic Global made;\n"
+            f"{solve} {{ (void)p, (void)r; return 0; }}\n"
+        )
     (folder / "upwards.cpp").write_text(
         f"#include <fclib_plugin.h>\n#include <cfenv>\n{solve} {{\n"
         "  std::fesetround(FE_UPWARD);\n  r[0] = 1 + 1e-8;\n"
         "  p->stop(p->context, r);\n  return 0;\n}\n"
     )
     (folder / "latin.c").write_text(TELLS_OF_ITS_OPTIONS.replace('"Tells"', r'"Tells \xe9"'))
-    thrown = ("throws", "throws-seven", "null", "told-nothing", "upwards")
+    thrown = (
+        "throws",
+        "throws-seven",
+        "null",
+        "told-nothing",
+        "upwards",
+        "raises",
+        "leaves",
+        "aborts",
+    )
     sources = {name: folder / f"{name}.cpp" for name in thrown} | {
         "pgs": ROOT / "examples/plugin/pgs.c",
         "pgs-cpp": folder / "pgs.cpp",
@@ -801,6 +820,25 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
         assert len(seen) == result.iterations + 1 > 1
     limited = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", tol=0, max_iterations=3)
     assert (limited.status, limited.iterations) == ("iteration_limit", 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("raises", "loading it raises: no licence"),
+        ("leaves", "ends the process that loads it .exit status 0"),
+        ("aborts", "ends the process that loads it .SIGABRT"),
+        ("other", "has no function fclib_plugin_solve"),
+    ],
+)
+def test_a_campaign_outlives_a_shared_object(shared_objects: Path, name: str, fault: str) -> None:
+    """Code that runs when it is loaded may end the process."""
+    plugin = f"plugin:{shared_objects}/lib{name}.so"
+    plan = {"solvers": ["nsgs", plugin], "problems": [{"planted": {"count": 1, "contacts": 1}}]}
+    with pytest.raises(bench.CampaignError, match=rf"lib{name}.so': {fault}"):
+        bench.Campaign.of(plan)
+    left = bench.Campaign.of({**plan, "solvers": ["nsgs", {"name": plugin, "optional": True}]})
+    assert [solver.name for solver in left.solvers] == ["nsgs"]
 
 
 def test_another_shared_object_is_another_version(shared_objects: Path, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from fclib._suggest import suggestion
 from fclib.bench import generated, problems
 from fclib.bench.fingerprint import version_of
 from fclib.bench.job import Along, Job, Limits, ProblemFacts, SolverChoice
-from fclib.bench.modules import load_modules
+from fclib.bench.modules import load_modules, try_plugin
 from fclib.bench.store import Store
 
 PUBLISHED = Path(__file__).with_name("campaigns")
@@ -586,6 +586,8 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
     forms = ("global", "local", "both") if "files" in row else ("global", "local")
     if row.get("form") not in (None, *forms):
         raise CampaignError(f"{where}form: {row['form']!r} is none of {', '.join(forms)}")
+    if WHAT & set(row) == {"planted"} and row.get("form") == "global":
+        raise CampaignError(f"{where}form: planted problems are local")
     steps = None
     if "sequence" in row:
         steps = _steps(row, where)
@@ -662,6 +664,7 @@ def _solvers(
             raise CampaignError(f"{where}options: is no table, as in options = {{ name = value }}")
         optional = _yes(entries, "optional", where)
         try:
+            try_plugin(name)
             info = _registry.find_solver(name)
             info.check_options(options)
         except _core.OptionError as error:

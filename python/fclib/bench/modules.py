@@ -1,13 +1,31 @@
-"""Files of Python with solvers of the user's own, which a campaign names and its workers import."""
+"""Solvers of the user's own that a campaign loads: files of Python, and shared objects."""
 
 from __future__ import annotations
 
 import importlib.util
+import signal
+import subprocess
 import sys
 from pathlib import Path
+from typing import Final
 
-from fclib import _registry
+from fclib import _core, _registry
 from fclib._regular import regular
+
+PLUGIN: Final = "plugin:"
+TRIED: Final = "tried:"  # before what a process says that has loaded a shared object
+TRY: Final = f"""
+import sys, fclib
+fault = ""
+try:
+    fclib.find_solver(sys.argv[1])
+except fclib.OptionError as error:
+    fault = str(error)
+except Exception as error:
+    fault = f"solver '{{sys.argv[1]}}': loading it raises: {{error}}"
+print({TRIED!r} + fault, flush=True)
+"""
+PATIENCE: Final = 60.0  # [s] for the code that a shared object runs when it is loaded
 
 _loaded: dict[str, str] = {}  # the files of those that are imported, by their names
 
@@ -39,3 +57,28 @@ def load_modules(paths: list[str]) -> None:
             del sys.modules[name]
             raise _registry.SolverError(f"{path}: {type(error).__name__}: {error}") from error
         _loaded[name] = path
+
+
+def try_plugin(name: str) -> None:
+    """Load a shared object in another process first: what it runs then may end the process.
+
+    Raises:
+        fclib.OptionError: it cannot be loaded, ends the process, or takes for ever. That there is no such
+            file is told by who loads it.
+    """
+    if not (name.startswith(PLUGIN) and Path(name.removeprefix(PLUGIN)).is_file()):
+        return
+    command = [sys.executable, "-c", TRY, name]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        fault = f"solver '{name}': takes more than {PATIENCE:g} s to be loaded"
+        raise _core.OptionError(fault) from None
+    _, tried, fault = done.stdout.decode(errors="replace").partition(TRIED)
+    if not tried:
+        ended = f"exit status {done.returncode}"
+        if done.returncode < 0:
+            ended = signal.Signals(-done.returncode).name
+        fault = f"solver '{name}': ends the process that loads it ({ended})"
+    if fault.strip():
+        raise _core.OptionError(fault.strip())

@@ -66,6 +66,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 PYTHON: dict[str, set[str]] = {
     "_entry_points": set(),
     "_files": set(),
+    "_marked": set(),
     "_words": set(),
     "_geometry": {"_words"},
     "_stored": set(),
@@ -92,7 +93,7 @@ PYTHON: dict[str, set[str]] = {
     "_layer": {"_batch", "_batch_derivatives", "_core"},
     "torch": {"_core", "_layer"},
     "jax": {"_core", "_layer"},
-    "external": {"_core", "_laws", "_registry"},
+    "external": {"_core", "_laws", "_marked", "_registry"},
     "analysis": {
         "_core",
         "_digest",
@@ -146,6 +147,7 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
     },
     "bench": {
+        "_marked",
         "_files",
         "_laws",
         "_core",

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 import fclib
-from fclib import _solve, analysis, bench
+from fclib import _marked, _solve, analysis, bench
 from fclib.bench import machine, meter, pool, problems, processes, template
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
@@ -751,7 +751,7 @@ def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
 
 def there(supervisor: SupervisorClient) -> set[int]:
     """The supervisor with its template and its own worker, and what a solver has left behind."""
-    pids = processes.marked(f"{MARK}={supervisor.mark}")
+    pids = _marked.marked(f"{MARK}={supervisor.mark}")
     return {pid for pid in pids if processes.state(pid) not in ("", "Z", "X")}
 
 
@@ -1164,16 +1164,16 @@ def test_nothing_is_left_of_a_campaign_that_is_killed_while_its_supervisor_is_st
         assert conductor.stdout is not None
         number, mark = conductor.stdout.readline().split()
         supervisor = int(number)
-        while len(processes.marked(f"{MARK}={mark}")) < 3:  # it, the template and a worker
+        while len(_marked.marked(f"{MARK}={mark}")) < 3:  # it, the template and a worker
             time.sleep(0.01)
         os.kill(supervisor, signal.SIGSTOP)
         conductor.kill()
     try:
         end = time.monotonic() + 60 * template.PATIENCE  # a busy machine may take any time
-        while processes.marked(f"{MARK}={mark}") and time.monotonic() < end:
+        while _marked.marked(f"{MARK}={mark}") and time.monotonic() < end:
             time.sleep(0.05)
-        assert processes.marked(f"{MARK}={mark}") == []
+        assert _marked.marked(f"{MARK}={mark}") == []
         if (above := meter.home()) is not None:
             assert list(above.glob(f"{meter.PREFIX}{supervisor}-*")) == []
     finally:
-        processes.kill(processes.marked(f"{MARK}={mark}"))
+        _marked.kill(_marked.marked(f"{MARK}={mark}"))

@@ -24,6 +24,7 @@ import pytest
 import fclib
 from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
+from fclib.bench import processes
 from fclib.bench.fingerprint import version_of
 from fclib.external import command, siconos
 from helpers import converged, local_problem, planted_global, planted_local, planted_rolling, ran
@@ -433,6 +434,31 @@ def is_running(pid: int) -> bool:
         return False
     state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     return state != "Z"
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs Linux")
+@pytest.mark.parametrize("ends", [False, True], ids=["at the limit", "before"])
+def test_what_a_program_starts_in_a_session_of_its_own_is_killed(
+    tmp_path: Path, ends: bool
+) -> None:
+    own = tmp_path / "own"
+    program = tmp_path / "program.sh"
+    last = "exit 1" if ends else "sleep 600"
+    program.write_text(
+        f"setsid sh -c 'echo $$ > {own}; sleep 600' </dev/null >/dev/null 2>&1 &\n"
+        f"while ! [ -s {own} ]; do sleep 0.01; done\n{last}\n"
+    )
+    words = f"cmd:sh {program} {{input}} {{output}}"
+    if ends:
+        with pytest.raises(fclib.SolverError, match="exit status 1"):
+            fclib.solve(problem_of(), words)
+    else:
+        assert fclib.solve(problem_of(), words, time_limit=2).status == "time_limit"
+    pid = int(own.read_text())
+    end = time.monotonic() + 30
+    while Path(f"/proc/{pid}").exists() and processes.state(pid) not in ("", "Z"):
+        assert time.monotonic() < end, "it goes on"
+        time.sleep(0.01)
 
 
 def test_a_program_that_takes_too_long_is_killed_with_its_children(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import fclib
-from fclib import bench
+from fclib import _marked, bench
 from fclib.bench import processes
 from helpers import planted_local
 
@@ -79,7 +79,7 @@ class Running:
 
     def left(self) -> list[int]:
         """What runs of it."""
-        alive = (pid for pid in processes.marked(self.mark) if pid != self.process.pid)
+        alive = (pid for pid in _marked.marked(self.mark) if pid != self.process.pid)
         return [pid for pid in alive if processes.state(pid) not in ("", "Z", "X")]
 
 

@@ -18,6 +18,7 @@ import time
 from collections.abc import Set
 from pathlib import Path
 
+from fclib import _marked
 from fclib.bench import processes
 
 PREFIX = "fclib-bench-"
@@ -198,7 +199,7 @@ def sweep(supervisor: int, mark: str) -> None:
         mark: a text in the environment of all processes that it started.
     """
     own = os.getpid()
-    processes.kill([pid for pid in processes.marked(mark) if pid != own])
+    _marked.kill([pid for pid in _marked.marked(mark) if pid != own])
     if (above := home()) is not None:
         for group in above.glob(f"{PREFIX}{supervisor}-*"):
             remove(group)

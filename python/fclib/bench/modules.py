@@ -63,8 +63,8 @@ def try_plugin(name: str) -> None:
     """Load a shared object in another process first: what it runs then may end the process.
 
     Raises:
-        fclib.OptionError: it cannot be loaded, ends the process, or takes for ever. That there is no such
-            file is told by who loads it.
+        fclib.OptionError: it cannot be loaded, ends the process, or takes for ever. If there is no
+            such file, whoever loads it says so.
     """
     if not (name.startswith(PLUGIN) and Path(name.removeprefix(PLUGIN)).is_file()):
         return

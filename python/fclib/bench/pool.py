@@ -26,6 +26,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 import fclib._core as _core
+from fclib import _marked
 from fclib.bench import meter, processes
 from fclib.bench.job import Job, Record
 from fclib.bench.supervisor import READY_LIMIT, WARM_LIMIT
@@ -201,7 +202,7 @@ class SupervisorClient:
     def kill(self) -> None:
         """End the supervisor and all processes that it started."""
         if self.process is not None:
-            processes.kill(processes.tree(self.process.pid)[::-1])
+            _marked.kill(processes.tree(self.process.pid)[::-1])
 
     def end(self) -> int:
         """Dismiss the supervisor, which kills its run. Return its exit status."""

@@ -12,6 +12,8 @@ from collections.abc import Set
 from pathlib import Path
 from typing import Any
 
+from fclib import _marked
+
 TICKS = os.sysconf("SC_CLK_TCK")
 PAGE = os.sysconf("SC_PAGE_SIZE")
 PROC = Path("/proc")
@@ -189,24 +191,6 @@ def state(pid: int) -> str:
     return fields[0] if fields else ""
 
 
-def marked(mark: str) -> list[int]:
-    """The processes that were started with a text in their environment."""
-    found, word = [], mark.encode()
-    for entry in PROC.iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError):
-                if word in (entry / "environ").read_bytes():
-                    found.append(int(entry.name))
-    return found
-
-
-def kill(pids: list[int]) -> None:
-    """End processes; some may have ended already."""
-    for pid in pids:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.kill(pid, signal.SIGKILL)
-
-
 def address_space(pid: int) -> int:
     """The size of a process in bytes; 0 if it has ended."""
     fields = _stat(pid)
@@ -254,7 +238,7 @@ def kill_all(pid: int, ours: Set[int] = frozenset(), patience: float = 5.0) -> i
         os.kill(pid, signal.SIGSTOP)  # it can start nothing more that would be missed
     targets = tree(pid)
     while True:
-        kill(targets)
+        _marked.kill(targets)
         left = [child for child in children(os.getpid()) if child not in ours]
         if not left:
             return status

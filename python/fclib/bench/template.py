@@ -28,7 +28,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fclib import _entry_points, _registry, external
+from fclib import _entry_points, _marked, _registry, external
 from fclib.bench import meter, processes
 
 # constants of clone(2) and mount(2)
@@ -98,7 +98,7 @@ class Template:
     def end(self) -> None:
         """Dismiss the template."""
         self.link.close()
-        processes.kill([self.pid])
+        _marked.kill([self.pid])
         with contextlib.suppress(ChildProcessError):
             os.waitpid(self.pid, 0)
 

@@ -27,14 +27,16 @@ import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
-from fclib import _core, _registry
+from fclib import _core, _marked, _registry
 from fclib._registry import make_solver
 
 PREFIX = "cmd:"
+MARK = "FCLIB_PROGRAM"  # in the environment of all that a program starts
 SOLVERS = "cmd:PROGRAM {input} {output}"
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 reported = False  # whether the last program reported the time of its solve
@@ -157,6 +159,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
     Raises:
         SolverError: it cannot be started, or ends with another status than 0.
     """
+    mark = uuid.uuid4().hex
     # if the system allows it: the program ends with this process, however this one ends
     guard = shutil.which("setpriv")
     prefix = [guard, "--pdeathsig", "KILL", "--"] if guard and sys.platform == "linux" else []
@@ -168,6 +171,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
                 stdout=subprocess.DEVNULL,
                 stderr=words,
                 start_new_session=True,
+                env=os.environ | {MARK: mark},
             )
         except OSError as error:
             raise _registry.SolverError(f"{command[0]}: {error.strerror}") from error
@@ -186,6 +190,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
             # the whole group, while the program's number is still its own
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)
+            _marked.kill(_marked.marked(f"{MARK}={mark}"))  # what has left the group
             _, status, usage = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
         cpu_s = usage.ru_utime + usage.ru_stime

@@ -11,8 +11,8 @@ from typing import Final
 
 from fclib import _core, _registry
 from fclib._regular import regular
+from fclib.external import plugin
 
-PLUGIN: Final = "plugin:"
 TRIED: Final = "tried:"  # before what a process says that has loaded a shared object
 TRY: Final = f"""
 import sys, fclib
@@ -66,7 +66,7 @@ def try_plugin(name: str) -> None:
         fclib.OptionError: it cannot be loaded, ends the process, or takes for ever. If there is no
             such file, whoever loads it says so.
     """
-    if not (name.startswith(PLUGIN) and Path(name.removeprefix(PLUGIN)).is_file()):
+    if not (name.startswith(plugin.PREFIX) and Path(name.removeprefix(plugin.PREFIX)).is_file()):
         return
     command = [sys.executable, "-c", TRY, name]
     try:

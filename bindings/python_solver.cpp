@@ -4,6 +4,7 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -60,11 +61,11 @@ class Watch {
   double error(nb::handle object) const { return error_of(problem(), checked(object)); }
 
   bool stop(nb::handle r, const std::optional<std::int64_t>& iteration) {
-    iterations = iteration.value_or(started_ ? iterations + 1 : 0);
+    set_iterations(iteration.value_or(started_ ? iterations_ + 1 : 0));
     started_ = true;
     const double reached = error(r);
     try {
-      reason_ = monitor_.report(iterations, reached);
+      reason_ = monitor_.report(iterations_, reached);
     } catch (nb::python_error& raised) {
       failure = nb::borrow(raised.value());
       throw;
@@ -84,8 +85,20 @@ class Watch {
     return claim_ ? *claim_ : reason_.value_or(Status::converged);
   }
 
-  std::int64_t iterations = 0;
-  std::optional<double> cpu_s;
+  [[nodiscard]] std::int64_t iterations() const { return iterations_; }
+  void set_iterations(std::int64_t count) {
+    if (count < 0) {
+      throw Error(ErrorKind::option, std::to_string(count) + " is negative", "iterations");
+    }
+    iterations_ = count;
+  }
+  [[nodiscard]] std::optional<double> cpu_s() const { return cpu_s_; }
+  void set_cpu_s(std::optional<double> seconds) {
+    if (seconds && !(*seconds >= 0 && std::isfinite(*seconds))) {
+      throw Error(ErrorKind::option, std::to_string(*seconds) + " is no time", "cpu_s");
+    }
+    cpu_s_ = seconds;
+  }
   nb::object failure = nb::none();  ///< what the callback raised
 
  private:
@@ -98,6 +111,8 @@ class Watch {
   Monitor monitor_;
   const ReducedProblem* problem_;
   bool started_ = false;
+  std::int64_t iterations_ = 0;
+  std::optional<double> cpu_s_;
   std::optional<Status> reason_;
   std::optional<Status> claim_;
 };
@@ -121,8 +136,8 @@ Outcome run(const nb::object& function, const std::vector<OptionInfo>& infos,
   const double cpu_s = cpu_time() - start;
   r = watch->checked(answer);
   return {.status = watch->status(),
-          .iterations = watch->iterations,
-          .cpu_s = watch->cpu_s.value_or(cpu_s)};
+          .iterations = watch->iterations(),
+          .cpu_s = watch->cpu_s().value_or(cpu_s)};
 }
 
 Solver python_solver(const std::string& name, const std::string& family, const std::string& title,
@@ -163,9 +178,10 @@ void bind_python_solvers(nb::module_& m) {
       .def_prop_ro("max_iterations", [](const Watch& w) { return w.settings().max_iterations; })
       .def_prop_ro("time_left", &Watch::time_left, "[s] wall clock, inf if there is no limit")
       .def_prop_ro("scale", &Watch::scale, "what errors are relative to: ||q|| of the problem")
-      .def_rw("iterations", &Watch::iterations, "that the result will state")
-      .def_rw("cpu_s", &Watch::cpu_s, nb::arg().none(),
-              "[s] to be set if the time is not that of the calling thread")
+      .def_prop_rw("iterations", &Watch::iterations, &Watch::set_iterations,
+                   "that the result will state; 0 or more")
+      .def_prop_rw("cpu_s", &Watch::cpu_s, &Watch::set_cpu_s, nb::for_setter(nb::arg().none()),
+                   "[s] to be set if the time is not that of the calling thread; 0 or more")
       .def_prop_rw(
           "status", [](const Watch& w) { return std::string(name_of(w.status())); },
           [](Watch& w, const std::string& name) { w.set_status(name); },

@@ -44,6 +44,29 @@ def exact(d: int = 3) -> Any:
 # ---- users' own solvers
 
 
+NO_WORK: list[str] = []  # what the next solver says
+
+
+@fclib.solver("t-no-work", title="says what is no work")
+def no_work(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    name, _, value = NO_WORK[-1].partition("=")
+    if name == "stop":
+        monitor.stop(r, int(value))
+    else:
+        setattr(monitor, name, int(value) if name == "iterations" else float(value))
+    return r
+
+
+@pytest.mark.parametrize(
+    "said", ["iterations=-3", "stop=-1", "cpu_s=inf", "cpu_s=nan", "cpu_s=-1e-9"]
+)
+def test_a_solver_cannot_claim_what_is_no_work(said: str) -> None:
+    NO_WORK.append(said)
+    name = "cpu_s" if said.startswith("cpu_s") else "iterations"
+    with pytest.raises(fclib.SolverError, match=rf"{name}.*(negative|no time)"):
+        fclib.solve(problem_of(), "t-no-work")
+
+
 @fclib.solver("t-liar", title="says it is done")
 def liar(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
     return r + 1.0

@@ -94,8 +94,8 @@ class Watch {
   }
   [[nodiscard]] std::optional<double> cpu_s() const { return cpu_s_; }
   void set_cpu_s(std::optional<double> seconds) {
-    if (seconds && !(*seconds >= 0 && std::isfinite(*seconds))) {
-      throw Error(ErrorKind::option, std::to_string(*seconds) + " is no time", "cpu_s");
+    if (seconds && !std::isfinite(*seconds)) {
+      throw Error(ErrorKind::option, std::to_string(*seconds) + " is not finite", "cpu_s");
     }
     cpu_s_ = seconds;
   }
@@ -181,7 +181,7 @@ void bind_python_solvers(nb::module_& m) {
       .def_prop_rw("iterations", &Watch::iterations, &Watch::set_iterations,
                    "that the result will state; 0 or more")
       .def_prop_rw("cpu_s", &Watch::cpu_s, &Watch::set_cpu_s, nb::for_setter(nb::arg().none()),
-                   "[s] to be set if the time is not that of the calling thread; 0 or more")
+                   "[s] to be set if the time is not that of the calling thread; finite")
       .def_prop_rw(
           "status", [](const Watch& w) { return std::string(name_of(w.status())); },
           [](Watch& w, const std::string& name) { w.set_status(name); },

@@ -942,6 +942,7 @@ def test_a_message_says_what_a_crashed_solver_said(
     record = supervisor.do(job(folder, "bad-segfaults"))
     assert "SIGSEGV" in record.message
     assert "about to read from nowhere" in record.message
+    assert "SIGABRT" in supervisor.do(job(folder, "bad-aborts")).message
 
 
 def test_a_file_that_changes_is_no_fault_of_the_solver(folder: Path, tmp_path: Path) -> None:

@@ -57,13 +57,11 @@ def no_work(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
     return r
 
 
-@pytest.mark.parametrize(
-    "said", ["iterations=-3", "stop=-1", "cpu_s=inf", "cpu_s=nan", "cpu_s=-1e-9"]
-)
+@pytest.mark.parametrize("said", ["iterations=-3", "stop=-1", "cpu_s=inf", "cpu_s=nan"])
 def test_a_solver_cannot_claim_what_is_no_work(said: str) -> None:
     NO_WORK.append(said)
     name = "cpu_s" if said.startswith("cpu_s") else "iterations"
-    with pytest.raises(fclib.SolverError, match=rf"{name}.*(negative|no time)"):
+    with pytest.raises(fclib.SolverError, match=rf"{name}.*(negative|not finite)"):
         fclib.solve(problem_of(), "t-no-work")
 
 

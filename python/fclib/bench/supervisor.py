@@ -362,6 +362,8 @@ class Supervisor:
         lines = worker.tail.decode(errors="replace").strip().splitlines()
         last = f": {lines[-1][:300]}" if lines else ""
         if not os.WIFSIGNALED(how):
+            if worker.apart and os.WEXITSTATUS(how) == signal.SIGABRT:
+                return WorkerEnded("crashed", f"ended by SIGABRT{last}")
             return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{last}")
         number = os.WTERMSIG(how)
         name = signal.Signals(number).name

@@ -811,11 +811,11 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, body in {
         "raises": 'throw std::runtime_error("no licence");',
         "leaves": "std::exit(0);",
-        "aborts": "std::abort();",
+        "aborts": 'std::fputs("no licence", stderr); std::abort();',
     }.items():
         (folder / f"{name}.cpp").write_text(
-            "#include <fclib_plugin.h>\n#include <cstdlib>\n#include <stdexcept>\n"
-            f"struct Global {{ Global() {{ {body} }} }};\nstatic Global made;\n"
+            "#include <fclib_plugin.h>\n#include <cstdio>\n#include <cstdlib>\n"
+            f"#include <stdexcept>\nstruct Global {{ Global() {{ {body} }} }};\nstatic Global made;\n"
             f"{solve} {{ (void)p, (void)r; return 0; }}\n"
         )
     (folder / "upwards.cpp").write_text(
@@ -874,7 +874,7 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
     [
         ("raises", "loading it raises: no licence"),
         ("leaves", "ends the process that loads it .exit status 0"),
-        ("aborts", "ends the process that loads it .SIGABRT"),
+        ("aborts", "ends the process that loads it .SIGABRT.: no licence"),
         ("other", "has no function fclib_plugin_solve"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import signal
 import subprocess
 import sys
@@ -15,7 +16,9 @@ from fclib.external import plugin
 
 TRIED: Final = "tried:"  # before what a process says that has loaded a shared object
 TRY: Final = f"""
-import sys, fclib
+import json, sys
+sys.path[:] = json.loads(sys.argv[2])
+import fclib
 fault = ""
 try:
     fclib.find_solver(sys.argv[1])
@@ -68,7 +71,7 @@ def try_plugin(name: str) -> None:
     """
     if not (name.startswith(plugin.PREFIX) and Path(name.removeprefix(plugin.PREFIX)).is_file()):
         return
-    command = [sys.executable, "-c", TRY, name]
+    command = [sys.executable, "-c", TRY, name, json.dumps(sys.path)]
     try:
         done = subprocess.run(command, capture_output=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired:
@@ -79,6 +82,8 @@ def try_plugin(name: str) -> None:
         ended = f"exit status {done.returncode}"
         if done.returncode < 0:
             ended = signal.Signals(-done.returncode).name
-        fault = f"solver '{name}': ends the process that loads it ({ended})"
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        last = f": {lines[-1].strip()[:300]}" if lines else ""
+        fault = f"solver '{name}': ends the process that loads it ({ended}){last}"
     if fault.strip():
         raise _core.OptionError(fault.strip())

@@ -815,7 +815,8 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }.items():
         (folder / f"{name}.cpp").write_text(
             "#include <fclib_plugin.h>\n#include <cstdio>\n#include <cstdlib>\n"
-            f"#include <stdexcept>\nstruct Global {{ Global() {{ {body} }} }};\nstatic Global made;\n"
+            "#include <stdexcept>\n"
+            f"struct Global {{ Global() {{ {body} }} }};\nstatic Global made;\n"
             f"{solve} {{ (void)p, (void)r; return 0; }}\n"
         )
     (folder / "upwards.cpp").write_text(

@@ -196,11 +196,17 @@ def test_rows_that_contradict_themselves_are_found(tmp_path: Path) -> None:
     rows[1]["solved"] = 0
     rows[2]["cpu_s"] = math.nan
     rows[3] = dict(rows[4])
+    # of these the tolerance bounds the natural map alone
+    assert rows[5]["status"] == rows[6]["status"] == "converged"
+    rows[5] |= {"merit": "natural", "error": 1.0}
+    rows[6] |= {"merit": "natural", "natural": 1.0}
     wrong = tmp_path / part.name
     pq.write_table(type(table).from_pylist(rows, schema=table.schema), wrong)
     said = "\n".join(results.verify(wrong))
     for word in ("row 0: is converged", "row 1: has the status", "row 2: cpu_s", "there twice"):
         assert word in said
+    assert "row 5" not in said
+    assert "row 6: is converged, and its error 1.0" in said
 
 
 @pytest.mark.parametrize("name", ["tol", "solver", "status", "hash", "history", "cpu_s"])

@@ -289,12 +289,18 @@ def verify(path: Path) -> list[str]:
     return wrong
 
 
+def error_of(row: Mapping[str, Any]) -> float | None:
+    """The error of a run that its tolerance bounds."""
+    error: float | None = row["error" if row["merit"] == "both" else "natural"]
+    return error
+
+
 def contradictions(row: Mapping[str, Any]) -> list[str]:
     """What is missing in a run, or contradicts itself."""
     wrong = [f"has no {name}" for name in NEEDED if row[name] is None]
     if wrong:
         return wrong
-    error, tol = row["error"], row["tol"]
+    error, tol = error_of(row), row["tol"]
     if row["status"] == "converged" and not (error is not None and error <= tol):
         wrong.append(f"is converged, and its error {error} is not within {tol}")
     if bool(row["solved"]) != is_solved(row["status"]):

@@ -18,7 +18,7 @@ from fclib._words import counted
 from fclib.bench.problems import SUFFIXES
 from fclib.bench.store import Store
 from fclib.collections.ratings import solution_of
-from fclib.results.shards import VECTORS, ShardError, pack, rows_of
+from fclib.results.shards import VECTORS, ShardError, error_of, pack, rows_of
 
 ENOUGH: Final = 5  # solutions that a submission has at least
 # a recomputed error may differ so much from the stored one, relative and absolute: another machine
@@ -66,14 +66,14 @@ def verdict(row: dict[str, Any], file: Path | None) -> dict[str, Any]:
     """The judgement on a row: "ok", "wrong", or "no problem" if its file is not there."""
     own = {name: row[name] for name in ("problem", "solver", "tol")}
     if file is None:
-        return {**own, "said": row["error"], "error": None, "status": "no problem"}
+        return {**own, "said": error_of(row), "error": None, "status": "no problem"}
     problem = _core.read(file, row["kind"] or None)
     r, multipliers = (
         None if row[name] is None else np.frombuffer(row[name], "<f8") for name in VECTORS
     )
     found = judge(problem, solution_of(r, multipliers), row["tol"], row["merit"])
-    said = row["error" if row["merit"] == "both" else "natural"]
-    same = abs(found.error - said) <= SAME[0] * said + SAME[1]
+    said = error_of(row)
+    same = said is not None and abs(found.error - said) <= SAME[0] * said + SAME[1]
     status = "ok" if found.ok and same else "wrong"
     return {**own, "said": said, "error": found.error, "status": status}
 

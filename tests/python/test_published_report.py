@@ -133,7 +133,7 @@ def test_the_page_is_made_of_parts(
 def test_the_curves_of_a_paper_stand_beside_ours(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each pair of curves with its distance, and what explains it."""
+    """Each pair of curves with its distance, and what that points to."""
     monkeypatch.setattr(_results, "FOLDER", tmp_path / "results")
     monkeypatch.setattr(published, "IMAGES", tmp_path)
     monkeypatch.setattr(published_2018, "PAGE", tmp_path / "page.md")
@@ -167,7 +167,7 @@ def test_the_curves_of_a_paper_stand_beside_ours(
         assert bool(row["Siconos to the paper"]) == (solver == "nsgs")
 
 
-def test_what_explains_a_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_distance_points_to(monkeypatch: pytest.MonkeyPatch) -> None:
     """The program of the paper runs on our problems: as the paper says, or as ours does."""
     count = 100  # problems: the band is 0.14
     instances = tuple(
@@ -184,7 +184,7 @@ def test_what_explains_a_distance(monkeypatch: pytest.MonkeyPatch) -> None:
         costs = comparison.Costs(instances, ("a", "b", "theirs"), values, "cpu_s")
         curve = [(1.0, paper), (1.5, paper)]
         taus = np.array([1.0, 1.5])
-        return published_2018.distance(costs, ["a", "b"], "a", curve, taus)["explained by"]
+        return published_2018.distance(costs, ["a", "b"], "a", curve, taus)["points to"]
 
     assert explained(0.5, 0.9, 0.55) == "chance"
     assert explained(0.2, 0.9, 0.85) == "the implementation"

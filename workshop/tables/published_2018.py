@@ -1,4 +1,4 @@
-"""The comparison of 2018 beside ours: its curves, its means, and what explains the distances.
+"""The comparison of 2018 beside ours: its curves, its means, and what the distances point to.
 
     python -m workshop.tables.published_2018 CURVES.csv
 
@@ -62,7 +62,7 @@ HEAD: Final = [
         "comparisons*, 2018). Here our solvers of the same methods, and Siconos' own, run on "
         "[families in the same regimes](family-groups.md#beside-the-published-sets). The problems "
         "of the paper are not to be had, so ours are other ones, and the machine is another one. A "
-        "run has less time here than in the paper. That changes the end of a curve where the "
+        "run has less time here than in the paper. That changes the end of a curve if the "
         "fastest solver takes long."
     ),
     *prose(
@@ -75,12 +75,13 @@ HEAD: Final = [
 DISTANCES: Final = (
     "The distance is the largest vertical one of the two curves of a solver, ours and that of the "
     "paper. Chance alone gives distances up to the band of Kolmogorov and Smirnov (95 %), which "
-    "shrinks with the number of our problems. A larger distance has a reason. If Siconos' own "
-    "solver takes the place of ours, on our problems, and comes within the band of the paper's "
-    f"curve, the reason is {CODE}. If it does not, and comes within the band of our curve, the "
-    f"reason is {PROBLEMS} (or the machine): the program of the paper differs from the paper as "
-    f"ours does. If it comes within neither, the reason may be {BOTH}. If Siconos' own solver has "
-    f"not run on enough of our problems, they are {OPEN}."
+    "shrinks with the number of our problems. The band takes the curve of the paper as exact. A "
+    f"larger distance points to a difference. It is {CODE} if Siconos' own solver, with its "
+    "default options and on our problems, comes within the band of the paper's curve in the place of ours. "
+    f"It is {PROBLEMS} (or the machine) if that solver comes within the band of our curve instead: "
+    "the program of the paper differs from the paper as ours does. If it comes within neither, it "
+    f"may be {BOTH}. If Siconos' own solver has not run on enough of our problems, they are "
+    f"{OPEN}. If our band is wider than half the height of a figure, there are {FEW}."
 )
 
 
@@ -150,7 +151,7 @@ def page(one: Set, path: Path) -> list[str]:
         "## How far are the curves from those of the paper?",
         "",
         *prose(DISTANCES),
-        *table("published-2018-reasons", reasons(rows), "What explains the distances", ""),
+        *table("published-2018-reasons", reasons(rows), "What the distances point to", ""),
         *table("published-2018", rows, "The distance of each pair of curves",
                "`at` is the ratio to the best at which the distance is largest."),
         "## The curves",
@@ -188,7 +189,7 @@ def band(costs: Costs) -> float:
 def distance(
     costs: Costs, labels: Sequence[str], solver: str, theirs: Curve, taus: Array
 ) -> dict[str, str]:
-    """How far our curve of a solver is from the paper's, and what explains it."""
+    """How far our curve of a solver is from the paper's, and what that points to."""
     ours = complete(costs, labels)
     place = list(labels).index(solver)
     wanted = share_at(theirs, taus)
@@ -199,12 +200,12 @@ def distance(
         "chance alone, up to": f"{band(ours):.2f}",
         "Siconos to the paper": "",
         "Siconos to ours": "",
-        "explained by": OPEN,
+        "points to": OPEN,
     }
     if band(ours) > WIDE:
-        row["explained by"] = FEW
+        row["points to"] = FEW
     elif apart.max() <= band(ours):
-        row["explained by"] = CHANCE
+        row["points to"] = CHANCE
     other = OWN.get(solver, "")
     both = complete(costs, [*labels, other]) if other in costs.solvers else None
     if both is None or not both.instances or band(both) > WIDE:
@@ -218,20 +219,20 @@ def distance(
     to_ours = float(np.abs(siconos - mine).max())
     row["Siconos to the paper"] = f"{to_paper:.2f}"
     row["Siconos to ours"] = f"{to_ours:.2f}"
-    if row["explained by"] == OPEN:
+    if row["points to"] == OPEN:
         near = band(both)
-        row["explained by"] = CODE if to_paper <= near else PROBLEMS if to_ours <= near else BOTH
+        row["points to"] = CODE if to_paper <= near else PROBLEMS if to_ours <= near else BOTH
     return row
 
 
 def reasons(rows: Sequence[Row]) -> list[Row]:
-    """How many pairs of curves have which explanation."""
+    """How many pairs of curves point to what."""
     groups: dict[str, list[float]] = defaultdict(list)
     for row in rows:
-        groups[row["explained by"]].append(float(row["largest distance"]))
+        groups[row["points to"]].append(float(row["largest distance"]))
     return [
         {
-            "explained by": reason,
+            "points to": reason,
             "pairs of curves": len(groups[reason]),
             "largest distance in the median": float(np.median(groups[reason])),
         }

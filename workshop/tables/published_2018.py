@@ -80,8 +80,8 @@ DISTANCES: Final = (
     "default options and on our problems, comes within the band of the paper's curve in the place "
     f"of ours. It is {PROBLEMS} (or the machine) if that solver comes within the band of our curve "
     "instead: the program of the paper differs from the paper as ours does. If it comes within "
-    f"neither, it may be {BOTH}. If Siconos' own solver has not run on enough of our problems, they are "
-    f"{OPEN}. If our band is wider than half the height of a figure, there are {FEW}."
+    f"neither, it may be {BOTH}. If Siconos' own solver has not run on enough of our problems, "
+    f"they are {OPEN}. If our band is wider than half the height of a figure, there are {FEW}."
 )
 
 

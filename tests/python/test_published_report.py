@@ -7,12 +7,14 @@ import csv
 import gzip
 import json
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fclib import bench
+import fclib
+from fclib import _digest, bench
 from fclib.bench import comparison
 
 pytest.importorskip("pyarrow")
@@ -21,8 +23,9 @@ from fclib import results
 from fclib.collections import set_index
 from fclib.collections.set_index import Choice
 from fclib.results import boards
+from helpers import dense, planted_global, planted_local
 from helpers_cli import invoke
-from workshop.tables import _results, published, published_2018
+from workshop.tables import _results, problem_facts, published, published_2018
 
 PLANTED = {"planted": {"count": 8, "contacts": 4, "seed": 1}, "family": "Chain"}
 PLAN = {
@@ -269,6 +272,54 @@ def test_a_site_of_published_runs_alone(run: Path, tmp_path: Path) -> None:
     said("profile", code=2)
     stores = [run / "small.sqlite"] * 2
     said("report", *stores, "--with", part, "--out", out, code=2)
+
+
+def test_facts_are_those_of_problems_that_have_runs(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "facts.csv"
+    with bench.Store(run / "small.sqlite") as opened:
+        part = results.pack(opened, tmp_path / "parts", "small", "fast")
+    assert part is not None
+    monkeypatch.setattr(results, "folder", lambda: tmp_path / "parts")
+    monkeypatch.setattr(problem_facts, "write", partial(problem_facts.write, path=table))
+    monkeypatch.setattr(problem_facts, "read", partial(problem_facts.read, path=table))
+    files = [str(path) for path in (run / "cache").rglob("*.hdf5")]
+    other = tmp_path / "other.hdf5"  # no run is of it
+    fclib.write(other, planted_local(3).problem)
+    problem_facts.main([*files, str(other), "--candidates"])
+    found = problem_facts.read()
+    assert found.keys() == {row["hash"] for row in results.rows_of(part, ("hash",))}
+    assert "8 of them new" in capsys.readouterr().out
+    first = fclib.read(files[0])
+    assert isinstance(first, fclib.LocalProblem)
+    row = found[_digest.digest(first)]
+    W = dense(first.W)
+    assert row["rank ratio"] == pytest.approx(np.linalg.matrix_rank(W) / len(W))
+    assert row["density"] is None  # a local problem has no degrees of freedom
+    whole = problem_facts.facts_of(planted_global(3).problem)
+    assert whole["density"] is not None
+    assert whole["density"] > 0
+    problem_facts.main(files)
+    assert "0 of them new" in capsys.readouterr().out
+
+
+def test_the_effect_of_a_fact_is_that_at_one_size() -> None:
+    """Planted: the time grows with size, and with a fact that large problems have more of."""
+    rng = np.random.default_rng(1)
+    size = np.exp(rng.uniform(1, 6, 200))
+    fact = size * np.exp(rng.normal(0, 1, 200))
+    costs = 1e-6 * size**1.5 * fact**-0.4
+    costs[size > np.quantile(size, 0.9)] = np.inf
+    shift, exponent, low, high = published.effect(fact, costs, size)
+    assert low <= exponent <= high
+    assert exponent == pytest.approx(-0.4, abs=1e-6)
+    _, alone, _, _ = published.effect(fact, costs)
+    assert alone > 0  # size is mistaken for it
+    assert shift < 0
+    # as many problems as unknowns carry nothing
+    assert np.isnan(published.effect(fact[:7], costs[:7], size[:7])[1])
+    assert np.isnan(published.effect(size, costs, size)[1])
 
 
 def test_what_a_guess_is_worth_by_solver() -> None:

@@ -90,12 +90,12 @@ def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
     }
 
 
-def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
-    """Rank and conditioning of W, without its bilateral constraints; None if m is large."""
+def spectrum_of(problem: Any, m: int, most: int = DENSE) -> tuple[int | None, float | None]:
+    """Rank and conditioning of W, without its bilateral constraints; None if m exceeds most."""
     from fclib.analysis._data import Data
     from fclib.analysis._spectrum import spectrum
 
-    if m > DENSE:
+    if m > most:
         return None, None
     try:
         reduced = Data.of_problem(problem).reduced

@@ -1,13 +1,11 @@
 """The readable report of the published runs: its tables, its pictures and its page.
 
-    python -m workshop.tables.published [--catalog FOLDER]
+    python -m workshop.tables.published
 
 It runs nothing. It reads the parts in results/ and writes docs/results/published-*.csv,
 docs/images/published-*.png and docs/published-results.md, which quotes them. A set is the name of
-its parts, or chosen from such runs. What nothing is published of is left out.
-
---catalog is a built collection (`fclib collection build ... --analyze`): it has the ranks and the
-conditioning.
+its parts, or chosen from such runs. What nothing is published of is left out. The ranks and the
+conditioning are those that `problem_facts.py` has stored.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from fclib import collections, results, scenes
+from fclib import results, scenes
 from fclib._verdicts import is_solved
 from fclib.bench import comparison, plots, profiles
 from fclib.bench.calibration import Calibration, calibration_in
@@ -33,7 +31,7 @@ from fclib.bench.comparison import Array, Costs, odds, words_in
 from fclib.bench.table import Table
 from fclib.collections import set_index
 from fclib.results.boards import CHOSEN_FROM, PART_OF, at_one_limit, by_name, digests_of, sources
-from workshop.tables import _results
+from workshop.tables import _results, problem_facts
 from workshop.tables.campaign import HINDSIGHT, beside_siconos
 
 Row: TypeAlias = dict[str, Any]
@@ -72,6 +70,13 @@ EFFECTS: Final = {
     "conditioning_W": "conditioning of W",
 }
 
+# what is asked of a fact and a family of methods: whether the time grows with the fact
+ASKED: Final = {
+    ("density", "splitting"): "sweeps take longer on dense problems",
+    ("density", "proximal point"): "proximal points take longer on dense problems",
+    ("conditioning_W", "splitting"): "sweeps take longer if W is conditioned worse",
+    ("conditioning_W", "interior point"): "interior points take longer if W is conditioned worse",
+}
 
 BESIDE: Final = (
     "A ratio is the CPU time of `auto` over that of the solver of Siconos that is the fastest on "
@@ -111,14 +116,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--parts", type=Path, help="folder of the parts")
-    parser.add_argument("--catalog", type=Path, help="a built collection, with ranks")
     own = parser.parse_args()
     folder = own.parts or results.folder()
     parts = results.shards(folder) if folder else []
     if not parts:
         raise SystemExit("no runs are published here")
     groups = by_name(parts)
-    facts = facts_of(own.catalog) if own.catalog else {}
+    facts = problem_facts.read()
     page: list[str] = []
     sets = []
     for name, shards in sources(groups).items():
@@ -164,7 +168,9 @@ HEAD: Final = [
 
 
 def of_sets(
-    sets: Sequence[Set], groups: Mapping[str, Sequence[results.Shard]], facts: Mapping[str, Row]
+    sets: Sequence[Set],
+    groups: Mapping[str, Sequence[results.Shard]],
+    facts: Mapping[str, problem_facts.Facts],
 ) -> Iterator[str]:
     """The parts of the page on sets."""
     yield from ("## What was run?", "")
@@ -229,14 +235,21 @@ def of_sets(
     yield from table("published-kinds", [row for one in telling for row in kind_rows(one)],
                      "The best of each family of methods, by kind of problem",
                      "The best solver is the one that solves most, then the fastest.")  # fmt: skip
-    effects = [row for one in telling for row in effect_rows(one, facts)]
+    found = {one.name: list(effects_of(one, facts)) for one in telling}
+    effects = [effect_row(one, own) for one in telling for own in found[one.name]]
     if effects:
         yield from ("## What do size, density, rank and conditioning do?", "")
         yield from prose(
             "The problems of a set are halved at the median of a fact. `shift of the share` is "
             "the share of solved problems in the upper half, less that in the lower half. The CPU "
             "time of solved problems grows with a power of the fact: `exponent` is this power, "
-            "with the interval of a bootstrap over problems."
+            "with the interval of a bootstrap over problems. The power of the number of contacts "
+            "is fitted together with that of any other fact. So the exponent of a fact is that "
+            "among problems of one size. Its shift may still come from size, because large "
+            "problems differ from small ones in all facts. The problems of a family are alike, and "
+            "the interval does not know it: it is too small rather than too large. Rank and "
+            "conditioning are known up to some thousand rows of W, and the degrees of freedom if "
+            "the problem is in global form."
         )
         yield from table(
             "published-effects", effects, "The effect of a fact on a family of methods", ""
@@ -250,8 +263,10 @@ def of_sets(
     yield from prose(
         "A statement is carried by the data if its 95 % interval lies on one side of the bound."
     )
-    yield from table("published-conclusions", [row for one in telling for row in conclusions(one)],
-                     "Statements, and whether the data carry them", "")  # fmt: skip
+    statements = [row for one in telling for row in conclusions(one, found[one.name])]
+    yield from table(
+        "published-conclusions", statements, "Statements, and whether the data carry them", ""
+    )
 
 
 def caption_of(one: Set) -> str:
@@ -525,22 +540,26 @@ def kind_rows(one: Set) -> list[Row]:
 # ---- effects
 
 
-def facts_of(folder: Path) -> dict[str, Row]:
-    """The facts of problems of a built collection, by digest of each form."""
-    found: dict[str, Row] = {}
-    for row in collections.read_catalog(folder).to_pylist():
-        size = row["spacedim"] * row["nc"]
-        rank = row.get("rank_W")
-        found[row["digest"]] = row | {"rank ratio": rank / size if rank and size else None}
-    return found
+@dataclass(frozen=True)
+class Effect:
+    """What a fact does to the best solver of a family of methods, to a tolerance."""
+
+    tol: float
+    fact: str
+    method: str
+    solver: str
+    shift: float  # of the share of solved problems, from the lower half to the upper one
+    exponent: float  # nan if too few problems are solved
+    low: float
+    high: float
 
 
-def effect_rows(one: Set, facts: Mapping[str, Row]) -> list[Row]:
-    """By tolerance, fact and family of methods: what the fact does to its best solver."""
-    found = []
+def effects_of(one: Set, facts: Mapping[str, problem_facts.Facts]) -> Iterator[Effect]:
+    """The effect of each fact on each family of methods, of facts that enough problems have."""
     for tol in one.tolerances:
         costs = one.costs.at(tol)
-        for fact, words in EFFECTS.items():
+        sizes = np.array([float(instance.nc) for instance in costs.instances])
+        for fact in EFFECTS:
             known = [
                 instance.nc if fact == "nc" else facts.get(instance.hash, {}).get(fact)
                 for instance in costs.instances
@@ -550,41 +569,58 @@ def effect_rows(one: Set, facts: Mapping[str, Row]) -> list[Row]:
             if len(there) < 8 or len(np.unique(values[there])) < 4:
                 continue
             part = costs.on_instances(there.tolist())
+            other = None if fact == "nc" else sizes[there]
             for method, solvers in methods_of(one).items():
                 name, own = best_in(part, solvers)
-                found.append(
-                    {
-                        "set": one.name,
-                        "tolerance": _results.power(tol),
-                        "fact": words,
-                        "methods": method,
-                        "solver": name.partition(" (")[0],
-                        **effect(values[there], own),
-                    }
-                )
-    return found
+                solver = name.partition(" (")[0]
+                yield Effect(tol, fact, method, solver, *effect(values[there], own, other))
 
 
-def effect(values: Array, costs: Array) -> Row:
-    """The shift of the share that is solved, and the exponent of the time, with its interval."""
+def effect_row(one: Set, found: Effect) -> Row:
+    """A row of the table of effects."""
+    known = math.isfinite(found.exponent)
+    return {
+        "set": one.name,
+        "tolerance": _results.power(found.tol),
+        "fact": EFFECTS[found.fact],
+        "methods": found.method,
+        "solver": found.solver,
+        "shift of the share": f"{found.shift:+.2f}",
+        "exponent": f"{found.exponent:.2f}" if known else "",
+        "95 % interval": f"{found.low:.2f} to {found.high:.2f}" if known else "",
+    }
+
+
+def effect(
+    values: Array, costs: Array, sizes: Array | None = None
+) -> tuple[float, float, float, float]:
+    """The shift of the share that is solved, and the exponent of the time, with its interval.
+
+    With sizes, the exponent is that among problems of one size: their power is fitted too.
+    """
     upper = values > np.median(values)
     solved = np.isfinite(costs)
-    shift = solved[upper].mean() - solved[~upper].mean() if upper.any() else 0.0
+    shift = float(solved[upper].mean() - solved[~upper].mean()) if upper.any() else 0.0
     x, y = np.log(values[solved]), np.log(costs[solved])
-    if len(x) < 8 or np.ptp(x) == 0:
-        return {"shift of the share": f"{shift:+.2f}", "exponent": "", "95 % interval": ""}
+    columns = [x, np.ones(len(x))]
+    if sizes is not None:
+        columns.append(np.log(sizes[solved]))
+    terms = np.column_stack(columns)
+    if len(x) < 8 or np.linalg.matrix_rank(terms) < len(columns):
+        return shift, math.nan, math.nan, math.nan
     rng = np.random.default_rng(0)
     slopes = []
     for _ in range(500):
         drawn = rng.integers(0, len(x), len(x))
-        if np.ptp(x[drawn]) > 0:
-            slopes.append(np.polyfit(x[drawn], y[drawn], 1)[0])
+        if np.linalg.matrix_rank(terms[drawn]) == len(columns):
+            slopes.append(slope(terms[drawn], y[drawn]))
     low, high = np.quantile(slopes, (0.025, 0.975))
-    return {
-        "shift of the share": f"{shift:+.2f}",
-        "exponent": f"{np.polyfit(x, y, 1)[0]:.2f}",
-        "95 % interval": f"{low:.2f} to {high:.2f}",
-    }
+    return shift, slope(terms, y), float(low), float(high)
+
+
+def slope(terms: Array, y: Array) -> float:
+    """The factor of the first term, by least squares."""
+    return float(np.linalg.lstsq(terms, y, rcond=None)[0][0])
 
 
 # ---- the best of all
@@ -628,7 +664,7 @@ def mean_of(values: Array) -> float:
 # ---- conclusions
 
 
-def conclusions(one: Set) -> list[Row]:
+def conclusions(one: Set, effects: Sequence[Effect]) -> list[Row]:
     """Statements on a set, each with an interval and a bound."""
     found = []
     for tol in one.tolerances:
@@ -684,6 +720,10 @@ def conclusions(one: Set) -> list[Row]:
                 words = f"Newton ({names[0]}) is faster than sweeps ({names[1]}): ratio of times"
                 say(words,
                     pair.ratio, pair.low, pair.high, 1.0, True)  # fmt: skip
+        for own in effects:
+            if own.tol == tol and (own.fact, own.method) in ASKED and math.isfinite(own.exponent):
+                say(f"{ASKED[own.fact, own.method]} ({own.solver}): exponent, at one size",
+                    own.exponent, own.low, own.high, 0.0, False)  # fmt: skip
     return found
 
 

@@ -248,8 +248,8 @@ def of_sets(
             "among problems of one size. Its shift may still come from size, because large "
             "problems differ from small ones in all facts. The problems of a family are alike, and "
             "the interval does not know it: it is too small rather than too large. Rank and "
-            "conditioning are known up to some thousand rows of W, and the degrees of freedom if "
-            "the problem is in global form."
+            "conditioning are left out if W is large, and the degrees of freedom if the problem is "
+            "in local form."
         )
         yield from table(
             "published-effects", effects, "The effect of a fact on a family of methods", ""

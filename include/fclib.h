@@ -827,7 +827,7 @@ struct fclib_derivatives {
   unsigned char* degenerate; /**< result: of each nc, or NULL: 1 if the contact is on a border
                                   between two statuses, where one of two derivatives is taken */
   unsigned char* unique;     /**< result: (count), or NULL: 0 if the change of r is not determined;
-                                  the least one is given */
+                                  one of them is given */
 };
 
 /** New. Derivatives in adjoint mode, and in forward mode. One factorisation serves all sides of a

@@ -268,7 +268,7 @@ class OneContact {
   static constexpr double well_conditioned = 1e-3;
 
   bool stick(double rho);
-  bool slide(double rho, double mu, double speed, const double* u);
+  bool slide(double rho, double mu, const Status& status, const double* z);
 
   const double* W_ = nullptr;
   const double* r_ = nullptr;
@@ -299,7 +299,10 @@ bool OneContact<D>::take(const double* W, const double* q, const double* mu, con
   }
   const Status status = status_of<D>(z, u, *mu, std::sqrt(square));
   degenerate_ = status.degenerate;
-  if (status.law == Law::slide) return slide(rho, *mu, status.speed, u);
+  if (status.law == Law::slide) {
+    // near the border to stick the rows are scaled
+    return !status.degenerate && slide(rho, *mu, status, z);
+  }
   for (int i = 0; i < D; ++i) {
     h_[i] = 0;
     for (int j = 0; j < D; ++j) G_[i][j] = 0;
@@ -351,12 +354,12 @@ bool OneContact<D>::stick(double rho) {
 ///   rho du_N = 0,   b + c du_s = 0,   c = mu r_N / ||u_T||
 ///
 /// are equations for a and b, K (a, b) = (-rho x_N, -c x_s), where x is du at a = b = 0. Without a
-/// speed t is not finite, and no comparison holds.
+/// speed c is not finite, and no comparison holds.
 template <int D>
-bool OneContact<D>::slide(double rho, double mu, double speed, const double* u) {
+bool OneContact<D>::slide(double rho, double mu, const Status& status, const double* z) {
   const double* const W = W_;
   double t[D]{};
-  for (int i = 1; i < D; ++i) t[i] = u[i] / speed;
+  for (int i = 1; i < D; ++i) t[i] = -z[i] / status.sliding;
   double Wt[D];
   for (int i = 0; i < D; ++i) {
     Wt[i] = W[D * i + 1] * t[1];
@@ -373,7 +376,7 @@ bool OneContact<D>::slide(double rho, double mu, double speed, const double* u) 
     G_[1][0] = -mu * t[1] * G_[0][0];
   } else {
     const double s[] = {0, -t[2], t[1]};
-    const double c = mu * r_[0] / speed;
+    const double c = mu * std::max(r_[0], 0.0) / status.speed;
     double Ws[3];
     for (int i = 0; i < 3; ++i) Ws[i] = W[3 * i + 1] * s[1] + W[3 * i + 2] * s[2];
     const double sWn = W[3] * s[1] + W[6] * s[2];
@@ -568,21 +571,24 @@ bool Point<D>::take(std::int64_t nc, const double* W, const double* q, const dou
       for (int k = 0; k < D; ++k) A[D * k + k] = rho_[a];
       continue;
     }
+    // The law is dr_T + mu t dr_N + r_N t dmu + mu r_N / ||u_T|| P du_T = 0, P = I - t t^T, times
+    // I - c P: no row grows without bound towards the border to stick. There rounding gives u a
+    // direction, and z = r - rho u has that of both.
     double t[D - 1];
     for (int k = 0; k < D - 1; ++k) {
-      // on the border to stick the reaction gives the direction of sliding
       const std::size_t place = at + 1 + static_cast<std::size_t>(k);
-      t[k] =
-          speed > 0 ? u_[place] / speed : -z_[place] / (status.sliding != 0 ? status.sliding : 1.0);
+      t[k] = -z_[place] / (status.sliding != 0 ? status.sliding : 1.0);
     }
+    const double bound = mu[a] * std::max(r[at], 0.0);
+    const double c = bound > 0 ? bound / (bound + rho_[a] * speed) : 0.0;
     A[0] = rho_[a];
-    const double turn = speed > 0 ? mu[a] * r[at] / speed : 0.0;
     for (int i = 1; i < D; ++i) {
       B[D * i] = mu[a] * t[i - 1];
-      B[D * i + i] = 1;
       by_mu_[at + static_cast<std::size_t>(i)] = -r[at] * t[i - 1];
       for (int j = 1; j < D; ++j) {
-        A[D * i + j] = turn * ((i == j ? 1.0 : 0.0) - t[i - 1] * t[j - 1]);
+        const double across = (i == j ? 1.0 : 0.0) - t[i - 1] * t[j - 1];
+        A[D * i + j] = c * rho_[a] * across;
+        B[D * i + j] = (i == j ? 1.0 : 0.0) - c * across;
       }
     }
   }

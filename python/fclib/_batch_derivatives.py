@@ -23,7 +23,7 @@ class BatchTangent(EqualByEntries):
     Attributes:
         r, u: the changes of reactions and velocities, in the shape of the changes of q.
         degenerate: (count, nc) contacts on a border between two statuses.
-        unique: (count,) whether the changes are determined; if not, that of r is the least one.
+        unique: (count,) whether the changes are determined; if not, that of r is one of many.
     """
 
     r: Floats
@@ -41,8 +41,8 @@ class BatchGradient(EqualByEntries):
         q: (count, [sides,] m)
         mu: (count, [sides,] nc)
         degenerate: (count, nc) contacts on a border between two statuses.
-        unique: (count,) whether the derivative is unique; if not, it belongs to the least change
-            of r.
+        unique: (count,) whether the derivative is unique; if not, it belongs to one of the
+            changes of r.
     """
 
     W: Floats

@@ -12,7 +12,8 @@ r_t = -r_N E^2 u_t / ||E u_t||. The status follows from z = r - rho u, which Ala
 projects.
 If z lies on a border between two statuses (grazing, at the limit of friction), the solution has no
 derivative. One of the two is taken, an element of the generalised Jacobian of the map, and the
-contact is flagged. If redundant contacts leave r undetermined, the least change of r is given.
+contact is flagged. If redundant contacts leave r undetermined, the least change of the unknowns,
+scaled to one size, is given.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ Smooth: TypeAlias = _laws.Problem
 BORDER = 1e-6
 # singular values below this, relative to the largest, are zero
 RANK = 1e-10
+TURNS = 1e-12  # axes with smaller values, relative to the largest, are not turned by a velocity
 REFINEMENTS = 3  # each one gives the digits of a double, less those of the conditioning
 
 
@@ -72,7 +74,7 @@ class Gradient(EqualByEntries):
         f, w, M, H, b: of a global one.
         mu_s, mu_r: (nc,) of a problem with spin or rolling friction.
         degenerate: (nc,) contacts on a border between two statuses.
-        unique: whether the derivative is unique; if not, it belongs to the least change of r and l.
+        unique: whether the derivative is unique; if not, it belongs to one change of r and l.
         error: ``Merit.error`` of the solution; if it is large, the numbers here mean nothing.
     """
 
@@ -322,29 +324,44 @@ class _Point:
                     self.by_r[tangent, tangent] = np.diag((~held[a]).astype(float))
                     self._free(a, group, bounds, rho[a], border)
                     continue
-                self.by_r[tangent, tangent] = np.eye(size)
+                # near the border to stick rounding gives u a direction, and z = r - rho u has both
+                speed, bound = float(np.linalg.norm(moved)), max(r[a, 0], 0.0)
                 if group.uniform:
-                    mu, speed = e[0], np.linalg.norm(moved)
-                    # on the border to stick the reaction gives the direction of sliding
-                    far = z[a, group.part]
-                    unit = moved / speed if speed > 0 else -far / (np.linalg.norm(far) or 1.0)
-                    self.by_r[tangent, d * a] = mu * unit
-                    turn = mu * r[a, 0] * (np.eye(size) - np.outer(unit, unit))
-                    self.by_u[tangent, tangent] = turn / speed if speed > 0 else 0 * turn
-                    self.by_friction[bounds[0]][a, group.part] = -r[a, 0] * unit
+                    mu, far = e[0], z[a, group.part]
+                    t = -far / (np.linalg.norm(far) or 1.0)  # r_g = -mu r_N t
+                    turn = mu * bound * (np.eye(size) - np.outer(t, t))
+                    self._creeps(a, tangent, mu * t, turn, speed, rho[a])
+                    self.by_friction[bounds[0]][a, group.part] = -r[a, 0] * t
                     continue
-                pull = np.linalg.norm(e * moved)
-                away = moved if pull > 0 else -_across(z[a, group.part], e)
+                near = rho[a] * speed <= border
+                away = -_across(z[a, group.part], e) if near else moved
                 length = np.linalg.norm(e * away) or 1.0
                 t = e * e * away / length  # r_g = -r_N t
-                self.by_r[tangent, d * a] = t
-                if pull > 0:
-                    turn = (np.diag(e * e) - np.outer(t, t)) / length
-                    self.by_u[tangent, tangent] = r[a, 0] * turn
+                turn = bound * (np.diag(e * e) - np.outer(t, t))
+                pull = float(np.linalg.norm(e * moved))
+                kept = self._creeps(a, tangent, t, turn, pull, rho[a])
                 by_axes = 2 * np.diag(e * away) / length
                 by_axes -= np.outer(t, e * away * away / length**2)
+                by_axes = kept @ by_axes
                 for axis, name in enumerate(bounds):
                     self.by_friction[name][a, group.part] -= r[a, 0] * by_axes[:, axis]
+
+    def _creeps(
+        self, a: int, tangent: slice, t: Array, turn: Array, speed: float, rho: float
+    ) -> Array:
+        """The rows dr_g + t dr_N + turn du_g / speed = 0, times K = (I + turn / (rho speed))^-1.
+
+        Returns K. With it no row grows without bound if the speed tends to 0; K du_g of the axes
+        that turn is then what is left.
+        """
+        values, axes = np.linalg.eigh(turn)
+        turns = values > TURNS * max(values.max(initial=0.0), 0.0)
+        whole = np.where(turns, speed + values / rho, 1.0)
+        kept = (axes * np.where(turns, speed / whole, 1.0)) @ axes.T
+        self.by_r[tangent, tangent] = kept
+        self.by_r[tangent, self.d * a] = kept @ t
+        self.by_u[tangent, tangent] = (axes * np.where(turns, values / whole, 0.0)) @ axes.T
+        return np.asarray(kept)
 
     def _free(
         self, a: int, group: _laws.Group, bounds: tuple[str, ...], rho: float, border: float

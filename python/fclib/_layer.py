@@ -5,8 +5,9 @@ It uses plain arrays; ``fclib.torch`` and ``fclib.jax`` connect it to their diff
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from fclib import _core
 from fclib._batch import solve_batch
 from fclib._batch_derivatives import jvp_batch, sensitivities_batch, vjp_batch
+from fclib._solve import check_limits
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Statuses: TypeAlias = npt.NDArray[np.int32]
@@ -44,6 +46,21 @@ def check_shapes(
         ) from None
 
 
+def check_options(tol: float, threads: int) -> None:
+    """OptionError if one is out of range, or no number, as one that is traced."""
+    check_limits(tol, None, threads=threads)
+
+
+def refuse_complex(name: str) -> NoReturn:
+    """For a type of numbers that no problem has."""
+    raise _core.ProblemError(f"{name}: has complex numbers, expected real ones")
+
+
+def _batch(q: Floats, *sizes: int) -> tuple[int, ...]:
+    """The shape of an array with a row for each problem, which may have no entry."""
+    return (math.prod(q.shape[:-1]), *sizes)
+
+
 def forward(
     W: Floats, q: Floats, mu: Floats, spacedim: int, tol: float, threads: int
 ) -> tuple[Floats, Floats, Statuses]:
@@ -53,9 +70,9 @@ def forward(
     """
     m = q.shape[-1]
     found = solve_batch(
-        W.reshape(-1, m, m),
-        q.reshape(-1, m),
-        mu.reshape(-1, m // spacedim),
+        W.reshape(_batch(q, m, m)),
+        q.reshape(_batch(q, m)),
+        mu.reshape(_batch(q, m // spacedim)),
         spacedim=spacedim,
         tol=tol,
         threads=threads,
@@ -78,12 +95,12 @@ def backward(
     """The derivatives of a loss by W, q and mu, from those by r and u."""
     m = q.shape[-1]
     found = vjp_batch(
-        W.reshape(-1, m, m),
-        q.reshape(-1, m),
-        mu.reshape(-1, m // spacedim),
-        r.reshape(-1, m),
-        r=by_r.reshape(-1, m),
-        u=by_u.reshape(-1, m),
+        W.reshape(_batch(q, m, m)),
+        q.reshape(_batch(q, m)),
+        mu.reshape(_batch(q, m // spacedim)),
+        r.reshape(_batch(q, m)),
+        r=by_r.reshape(_batch(q, m)),
+        u=by_u.reshape(_batch(q, m)),
         spacedim=spacedim,
         threads=threads,
     )
@@ -103,14 +120,14 @@ def tangent(
     m = q.shape[-1]
     sizes = ((m, m), (m,), (m // spacedim,))
     dW, dq, dmu = (
-        None if one is None else one.reshape(-1, *own)
+        None if one is None else one.reshape(_batch(q, *own))
         for one, own in zip(changes, sizes, strict=True)
     )
     found = jvp_batch(
-        W.reshape(-1, m, m),
-        q.reshape(-1, m),
-        mu.reshape(-1, m // spacedim),
-        r.reshape(-1, m),
+        W.reshape(_batch(q, m, m)),
+        q.reshape(_batch(q, m)),
+        mu.reshape(_batch(q, m // spacedim)),
+        r.reshape(_batch(q, m)),
         dW=dW,
         dq=dq,
         dmu=dmu,
@@ -126,10 +143,10 @@ def sensitivities(
     """The matrices of dr = by_q (dq + dW r) + by_mu dmu."""
     m, nc = q.shape[-1], mu.shape[-1]
     by_q, by_mu = sensitivities_batch(
-        W.reshape(-1, m, m),
-        q.reshape(-1, m),
-        mu.reshape(-1, nc),
-        r.reshape(-1, m),
+        W.reshape(_batch(q, m, m)),
+        q.reshape(_batch(q, m)),
+        mu.reshape(_batch(q, nc)),
+        r.reshape(_batch(q, m)),
         spacedim,
         threads,
     )

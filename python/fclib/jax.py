@@ -33,10 +33,15 @@ def solve(
 
     It is a callback of the host, with the derivatives of ``fclib.vjp`` and ``fclib.jvp``, but no
     second ones. Inside all is computed in double precision. The result has the common type of W, q
-    and mu, which is single if ``jax_enable_x64`` is not set.
+    and mu, which is single if ``jax_enable_x64`` is not set. Derivatives are those at the r that is
+    returned: in single precision they are coarse for a contact that slides slowly.
 
     W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
-    arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
+    arguments are those of ``fclib.solve_batch``, numbers and not traced; gradients need a tol far
+    below 1e-6.
+
+    On a machine with one core, callbacks of JAX with large arrays wait for ever under ``jit``. Set
+    the environment variable NPROC to 2 there, before JAX is imported.
 
     A problem that is not valid, has no solution or is not solved to tol has NaN for r and u, and
     does not disturb the others. To leave such problems out of a loss, take
@@ -47,12 +52,19 @@ def solve(
         is converged.
 
     Raises:
-        ProblemError: shapes do not agree.
+        ProblemError: shapes do not agree, or numbers are complex.
+        OptionError: tol or threads is out of range, or traced.
         UnsuitableError: a second derivative is asked for.
     """
     W, q, mu = (jnp.asarray(one) for one in (W, q, mu))
     batch = _layer.check_shapes(W.shape, q.shape, mu.shape, spacedim)
-    kind = jnp.result_type(W, q, mu, jnp.float32)
+    _layer.check_options(tol, threads)
+    for name, one in (("W", W), ("q", q), ("mu", mu)):
+        if jnp.iscomplexobj(one):
+            _layer.refuse_complex(name)
+    kind = jnp.result_type(W, q, mu)
+    if not jnp.issubdtype(kind, jnp.floating):
+        kind = jnp.result_type(float)
     m = q.shape[-1]
     found: tuple[Any, ...] = _solve(
         spacedim,
@@ -90,11 +102,24 @@ def _solve_jvp(spacedim: int, tol: float, threads: int, at: Any, change: Any) ->
     solved = (status == 0)[..., None]
     r_or_zero = jnp.where(solved, r, 0)
     W_or_zero = jnp.where(solved[..., None], W, 0)
-    moved = dq + _times(dW, r_or_zero)
-    dr = _times(by_q, moved) + _times(by_mu, dmu)
-    du = _times(W_or_zero, dr) + jnp.where(solved, moved, 0)
+    moved = _told(solved, dq + _times(dW, r_or_zero))
+    dr = _told(solved, _times(by_q, moved) + _times(by_mu, _told(solved, dmu)))
+    du = _told(solved, _times(W_or_zero, dr) + moved)
     nothing = np.zeros(status.shape, dtype=jax.dtypes.float0)
     return (r, u, status), (dr, du, nothing)
+
+
+def _told(solved: Any, change: Any) -> Any:
+    """The change, but NaN for one of a problem that is not solved, in both directions.
+
+    No change stays none: who leaves such a problem out of a loss gets zeros.
+    """
+
+    def own(_: Any, change: Any) -> Any:
+        return jnp.where(solved | (change == 0), change, jnp.nan)
+
+    # JAX takes it for a linear function that is its own transpose, and does not look into it
+    return jax.lax.custom_linear_solve(lambda x: x, change, own, symmetric=True)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))

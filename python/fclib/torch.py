@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NoReturn
 
 import torch
@@ -31,7 +32,7 @@ class _Solve(torch.autograd.Function):  # type: ignore[misc]
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         r, u, status = _layer.forward(_array(W), _array(q), _array(mu), spacedim, tol, threads)
         ctx.options = (spacedim, threads)
-        ctx.reactions = r
+        ctx.reactions = r.copy()  # r itself becomes the caller's, who may change it
         ctx.save_for_backward(W, q, mu)
         ctx.save_for_forward(W, q, mu)
         statuses = torch.from_numpy(status).to(q.device)
@@ -87,11 +88,13 @@ def solve(
     """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
     The gradient is that of ``fclib.vjp_batch``, and in forward mode of ``fclib.jvp_batch``; there
-    is no second one. All is computed in double precision on the CPU, and returned in the type and
-    on the device of q.
+    is no second one, and neither ``torch.func`` nor ``vectorize=True`` is supported. All is
+    computed in double precision on the CPU, and returned on the device of q, in the common type of
+    W, q and mu; integers count as the default type of floats.
 
-    W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
-    arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
+    W is (..., m, m), q (..., m) and mu (..., nc), tensors or what becomes one; their leading sizes
+    are broadcast. The other arguments are those of ``fclib.solve_batch``; gradients need a tol far
+    below 1e-6.
 
     A problem that is not valid, has no solution or is not solved to tol has NaN for r and u, and
     does not disturb the others. To leave such problems out of a loss, take
@@ -102,10 +105,13 @@ def solve(
         is converged.
 
     Raises:
-        ProblemError: shapes do not agree.
+        ProblemError: shapes do not agree, or numbers are complex.
+        OptionError: tol or threads is out of range.
         UnsuitableError: a second derivative is asked for.
     """
+    W, q, mu = _of_one_type(W, q, mu)
     batch = _layer.check_shapes(tuple(W.shape), tuple(q.shape), tuple(mu.shape), spacedim)
+    _layer.check_options(tol, threads)
     m = q.shape[-1]
     r, u, statuses = _Solve.apply(  # type: ignore[no-untyped-call, unused-ignore]
         W.expand(*batch, m, m),
@@ -116,6 +122,20 @@ def solve(
         threads,
     )
     return (r, u, statuses) if status else (r, u)
+
+
+def _of_one_type(*given: Any) -> tuple[torch.Tensor, ...]:
+    """Dense tensors of the common type of all, of floats."""
+    tensors = []
+    for name, one in zip(("W", "q", "mu"), given, strict=True):
+        tensor = torch.as_tensor(one)
+        if tensor.is_complex():
+            _layer.refuse_complex(name)
+        tensors.append(tensor if tensor.layout == torch.strided else tensor.to_dense())
+    kind = functools.reduce(torch.promote_types, (tensor.dtype for tensor in tensors))
+    if not kind.is_floating_point:
+        kind = torch.get_default_dtype()
+    return tuple(tensor.to(kind) for tensor in tensors)
 
 
 def _array(tensor: torch.Tensor) -> Any:

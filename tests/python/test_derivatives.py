@@ -139,6 +139,52 @@ def test_borders_are_flagged_with_the_derivative_of_one_side() -> None:
     assert fclib.jvp(grazing, np.zeros(3), q=[1, 0, 0]).degenerate.all()
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12, 1e-9])
+def test_rounding_gives_no_direction_of_sliding(noise: float) -> None:
+    """At rest at the limit of friction: the derivative is that of sticking, or that of sliding."""
+    rng = np.random.default_rng(3)
+    t = np.array([0, np.cos(0.7), np.sin(0.7)])
+    r = np.array([1, 0, 0]) - 0.5 * t
+    for _ in range(30):
+        A = rng.normal(size=(3, 3))
+        W = A @ A.T + 0.1 * np.eye(3)
+        q = -W @ r + noise * np.append(0, rng.normal(size=2))
+        sliding = fclib.jvp(fclib.LocalProblem(W=W, q=q + 1e-5 * t, mu=[0.5]), r, mu=[1.0])
+        assert not sliding.degenerate.any()
+        whole = fclib.jvp(fclib.LocalProblem(W=W, q=q, mu=[0.5]), r, mu=[1.0])
+        batch = fclib.jvp_batch(W[None], q[None], 0.5, r[None], dmu=np.ones((1, 1)))
+        # two contacts are not solved in closed form
+        twice = np.kron(np.eye(2), W)[None]
+        pair = fclib.jvp_batch(
+            twice, np.tile(q, 2)[None], 0.5, np.tile(r, 2)[None], dmu=np.ones((1, 2))
+        )
+        for dr in (whole.r, batch.r[0], pair.r[0, :3], pair.r[0, 3:]):
+            assert min(abs(dr).max(), abs(dr - sliding.r).max()) < 1e-3
+        assert whole.degenerate.all()
+        assert batch.degenerate.all()
+        assert pair.degenerate.all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12, 1e-9])
+def test_rounding_gives_no_direction_on_an_ellipsoid(noise: float) -> None:
+    rng = np.random.default_rng(5)
+    e = np.array([0.5, 0.5, 0.2])  # of the two tangents and of spin
+    for _ in range(30):
+        w = rng.normal(size=3)
+        r = np.append(1, -e * e * w / np.linalg.norm(e * w))
+        A = rng.normal(size=(4, 4))
+        W = A @ A.T + 0.1 * np.eye(4)
+        given: Any = {"W": W, "mu": [0.5], "mu_s": [0.2], "coupled": 1, "spacedim": 4}
+        q = -W @ r + noise * np.append(0, rng.normal(size=3))
+        away = 1e-4 * np.append(0, w)
+        sliding = fclib.jvp(fclib.LocalSpinProblem(q=q + away, **given), r, mu=[1.0])
+        assert not sliding.degenerate.any()
+        found = fclib.jvp(fclib.LocalSpinProblem(q=q, **given), r, mu=[1.0])
+        assert found.degenerate.all()
+        size = max(1.0, abs(sliding.r).max())
+        assert min(abs(found.r).max(), abs(found.r - sliding.r).max()) < 1e-2 * size
+
+
 def test_an_ellipsoid_without_friction_has_the_derivative_of_none() -> None:
     spin = fclib.LocalSpinProblem(
         spacedim=4, W=np.eye(4), q=[-1, 0.7, 0, 1], mu=[0], mu_s=[0], coupled=True

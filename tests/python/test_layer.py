@@ -59,6 +59,24 @@ def test_wrong_shapes_are_named() -> None:
         shapes((5, 5), (5,), (1,), 3)
 
 
+def test_no_contacts_are_solved_and_wrong_options_named() -> None:
+    """Worlds in which nothing touches."""
+    nothing = np.zeros((4, 0, 0)), np.zeros((4, 0)), np.zeros((4, 0))
+    r, u, status = _layer.forward(*nothing, 3, 1e-10, 1)
+    assert r.shape == u.shape == (4, 0)
+    assert status.tolist() == [0] * 4
+    by = _layer.backward(*nothing, r, 3, r, u, 1)
+    assert [one.shape for one in by] == [(4, 0, 0), (4, 0), (4, 0)]
+    dr, du = _layer.tangent(*nothing, r, 3, [None, r, None], 1)
+    assert dr.shape == du.shape == (4, 0)
+    by_q, by_mu = _layer.sensitivities(*nothing, r, 3, 1)
+    assert (by_q.shape, by_mu.shape) == ((4, 0, 0), (4, 0, 0))
+    with pytest.raises(fclib.OptionError, match="threads: -1"):
+        _layer.check_options(1e-10, -1)
+    with pytest.raises(fclib.OptionError, match="tol"):
+        _layer.check_options(float("nan"), 1)
+
+
 def worlds_with_bad_ones() -> tuple[Any, Any, Any]:
     """One that is solved, one without a solution, one that is no problem, one that is solved."""
     W = np.stack([np.eye(3), np.zeros((3, 3)), np.eye(3), 2 * np.eye(3)])
@@ -125,6 +143,33 @@ def test_torch_agrees_with_differences() -> None:
         fclib.torch.solve(W, q, mu[:, :1])
 
 
+def test_torch_takes_what_becomes_a_tensor_and_gives_what_may_be_changed() -> None:
+    torch = pytest.importorskip("torch")
+    import fclib.torch
+
+    q, mu = torch.tensor([-1.0, 3, 0]).double(), torch.tensor([0.5]).double()
+    found = []
+    for in_place in (False, True):
+        W = torch.eye(3).double().requires_grad_()
+        r, u = fclib.torch.solve(W, q, mu)
+        if in_place:
+            r *= 2  # the caller's own
+        else:
+            r = r * 2
+        found.append(torch.autograd.grad(r.sum() + u.sum(), W)[0])
+    torch.testing.assert_close(*found)
+    r, _ = fclib.torch.solve(2 * np.eye(3), [-3, 1, 0], [1])
+    assert r.tolist() == [1.5, -0.5, 0]
+    half = q.to(torch.float16).requires_grad_()
+    W = torch.eye(3).double().requires_grad_()
+    (fclib.torch.solve(W, 300 * half, mu)[0] ** 2).sum().backward()
+    assert torch.isfinite(W.grad).all()
+    with pytest.raises(fclib.ProblemError, match="W: has complex numbers"):
+        fclib.torch.solve(1j * W, q, mu)
+    with pytest.raises(fclib.ProblemError, match=r"mu: has the shape \(\)"):
+        fclib.torch.solve(W, q, 0.5)
+
+
 def test_torch_masks_bad_worlds_and_refuses_a_second_derivative() -> None:
     torch = pytest.importorskip("torch")
     import fclib.torch
@@ -184,6 +229,30 @@ def test_jax_agrees_with_differences() -> None:
     assert r.shape == q.shape
     with pytest.raises(fclib.ProblemError, match="mu: has the shape"):
         fclib.jax.solve(W, q, mu[:, :1])
+
+
+def test_jax_tells_that_a_problem_is_not_solved() -> None:
+    """Who leaves it in a loss gets no finite gradient, in both modes."""
+    jax = pytest.importorskip("jax")
+    import fclib.jax
+
+    jax.config.update("jax_enable_x64", True)
+    W, q, mu = worlds_with_bad_ones()
+
+    def loss(W: Any, q: Any, mu: Any) -> Any:
+        return fclib.jax.solve(W, q, mu)[0].sum(axis=-1)
+
+    by = jax.jacrev(loss, argnums=1)(W, q, mu)
+    own = np.array([by[k, k] for k in range(4)])
+    assert np.isnan(own).any(axis=1).tolist() == [False, True, True, False]
+    assert np.isfinite(by[[0, 0, 3, 3], [1, 2, 1, 2]]).all()  # others are not disturbed
+    _, change = jax.jvp(lambda mu: loss(W, q, mu), (mu,), (np.ones_like(mu),))
+    assert np.isnan(change).tolist() == [False, True, True, False]
+    with pytest.raises(fclib.OptionError, match="tol"):
+        jax.jit(lambda tol: fclib.jax.solve(W, q, mu, tol=tol))(1e-8)
+    with pytest.raises(fclib.ProblemError, match="q: has complex numbers"):
+        fclib.jax.solve(W, 1j * q, mu)
+    assert fclib.jax.solve(2 * np.eye(3, dtype=int), [-3, 1, 0], [1])[0].tolist() == [1.5, -0.5, 0]
 
 
 def test_jax_masks_bad_worlds_and_refuses_a_second_derivative() -> None:

@@ -171,7 +171,7 @@ collection-wheel: setup $(VENV)/.package-tools
 
 # from the packages alone: nothing is built or run
 published-site: setup
-	$(BIN)/fclib report --with published --merit both --catalog tiny --with-files \
+	$(BIN)/fclib report --with published --catalog tiny --with-files \
 	  --title "Published runs" --out $(BUILD)/published-site
 
 results-wheel: setup $(VENV)/.package-tools

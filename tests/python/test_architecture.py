@@ -90,7 +90,7 @@ PYTHON: dict[str, set[str]] = {
     "_batch_derivatives": {"_batch", "_core", "_equality", "_solve"},
     "_workspace": {"_core", "_solve"},
     "_derivatives": {"_core", "_equality", "_laws"},
-    "_layer": {"_batch", "_batch_derivatives", "_core"},
+    "_layer": {"_solve", "_batch", "_batch_derivatives", "_core"},
     "torch": {"_core", "_layer"},
     "jax": {"_core", "_layer"},
     "external": {"_core", "_laws", "_marked", "_registry"},

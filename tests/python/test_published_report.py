@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import csv
 import gzip
-import json
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 
 import fclib
 from fclib import _digest, bench
-from fclib.bench import comparison
+from fclib.bench import calibration, comparison, machine
 
 pytest.importorskip("pyarrow")
 
@@ -46,7 +45,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("published")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FCLIB_CACHE", str(folder / "cache"))
+        calibration.save(calibration.calibrate(0.05))
         bench.run_campaign(bench.Campaign.of(PLAN), folder / "small.sqlite")
+    machine.facts.cache_clear()  # those of other tests have no calibration
     return folder
 
 
@@ -63,8 +64,9 @@ def test_a_submission_is_judged_again(run: Path, tmp_path: Path) -> None:
     verdicts = results.judged(part, [run / "cache"])
     assert Counter(row["status"] for row in verdicts) == {"ok": 18}  # three solvers, six problems
     assert "ok" in said("results", "verify", part, "--problems", run / "cache")
-    missing = said("results", "verify", part, "--problems", tmp_path, "--json")
-    assert json.loads(missing)["without a problem"] == 18
+    missing = said("results", "verify", part, "--problems", tmp_path, code=1)
+    assert "so it is not judged" in missing
+    assert "is no folder" in said("results", "verify", part, "--problems", "nowhere", code=1)
     # whoever claims a solution that is none is found
     table = pq.read_table(part)
     rows = table.to_pylist()
@@ -73,11 +75,24 @@ def test_a_submission_is_judged_again(run: Path, tmp_path: Path) -> None:
     pq.write_table(type(table).from_pylist(rows, schema=table.schema), part)
     assert [row["status"] for row in results.judged(part, [run])].count("wrong") == 1
     said("results", "verify", part, "--problems", run / "cache", code=1)
+    # what is no vector is told, and ends nothing
+    for content in (own["r"][:7], own["r"][:8], None):
+        own["r"] = content
+        pq.write_table(type(table).from_pylist(rows, schema=table.schema), part)
+        found = [row for row in results.judged(part, [run]) if row["status"] == "wrong"]
+        assert len(found) == (content is not None)
+        assert all(row["why"] for row in found)
+    plain_rows = pq.read_table(part).drop_columns(["l"])
+    pq.write_table(plain_rows, part)
+    assert {row["status"] for row in results.judged(part, [run])} == {"ok"}
+    pq.write_table(plain_rows.slice(0, 1), part)
+    with pytest.raises(results.ShardError, match="and 5 are asked for"):
+        results.judged(part, [run])
     # a plain part has none
     with bench.Store(store) as opened:
         plain = results.pack(opened, tmp_path / "parts", "small")
     assert plain is not None
-    with pytest.raises(results.ShardError, match="no solution"):
+    with pytest.raises(results.ShardError, match="has 0 solutions to judge"):
         results.judged(plain, [run])
 
 
@@ -94,6 +109,40 @@ def test_the_leaders_of_a_set(run: Path, tmp_path: Path) -> None:
     shares = [row["share"] for row in rows if row["tol"] == 1e-8]
     assert shares == sorted(shares, reverse=True)
     assert "nsn-ac" in said("results", "leaders", "--in", tmp_path)
+
+
+def test_a_name_of_a_built_in_solver_is_not_taken(run: Path, tmp_path: Path) -> None:
+    plan = {**PLAN, "solvers": [{"name": "apgd", "label": "nsgs"}], "name": "taken"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FCLIB_CACHE", str(run / "cache"))
+        machine.facts.cache_clear()
+        bench.run_campaign(bench.Campaign.of(plan), tmp_path / "taken.sqlite")
+    machine.facts.cache_clear()
+    submitted = said("results", "submit", tmp_path / "taken.sqlite", "--name", "a",
+                     "--out", tmp_path / "out", code=1)  # fmt: skip
+    assert "calls apgd nsgs, which is another solver" in " ".join(submitted.split())
+    assert not list((tmp_path / "out").glob("*"))
+
+
+def test_published_runs_are_asked_for_before_a_campaign(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with bench.Store(run / "small.sqlite") as opened:
+        part = results.pack(opened, tmp_path / "parts", "small", "fast")
+    own = tmp_path / "own.toml"
+    own.write_text('solvers = ["bb"]\n[[problems]]\nplanted = { count = 1 }\n')
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))  # where no calibration is
+    machine.facts.cache_clear()
+    store = tmp_path / "own.sqlite"
+    words = ["bench", own, "--solver", "bb", "--store", store, "--with"]
+    assert "was not calibrated" in said(*words, part, code=1)
+    assert "nowhere.parquet" in said(*words, "nowhere.parquet", code=1)
+    assert not store.exists()
+    mine = run / "small.sqlite"
+    assert "--campaign" in said("profile", mine, "--with", part, "--campaign", "small", code=2)
+    assert "there is: small" in said("profile", "--with", part, "--set", "large", code=1)
+    assert "84 published runs" in said("profile", "--with", part, "--set", "small")
+    machine.facts.cache_clear()
 
 
 def test_the_page_is_made_of_parts(

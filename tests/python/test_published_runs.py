@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import shutil
@@ -23,6 +24,7 @@ pytest.importorskip("pyarrow")
 
 from fclib import results
 from fclib.results.beside import replaced
+from fclib.results.shards import DIGITS
 from helpers_cli import invoke
 from workshop.tables import two_machines
 
@@ -207,6 +209,119 @@ def test_rows_that_contradict_themselves_are_found(tmp_path: Path) -> None:
         assert word in said
     assert "row 5" not in said
     assert "row 6: is converged, and its error 1.0" in said
+
+
+def changed(part: Path, to: Path, changes: dict[str, Any], row: int = 0) -> Path:
+    """A part with other entries in a row, under the name of its content."""
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(part)
+    rows = table.to_pylist()
+    rows[row] |= changes
+    to.mkdir(exist_ok=True)
+    pq.write_table(type(table).from_pylist(rows, schema=table.schema), to / "new")
+    digest = hashlib.sha256((to / "new").read_bytes()).hexdigest()[:DIGITS]
+    return (to / "new").rename(to / f"small-{digest}.parquet")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"cpu_s": None}, "is solved in None s"),
+        ({"cpu_s": 50.0, "total_cpu_s": 50.0}, "is solved in 50.0 s, and its limit is"),
+        ({"cpu_s": 0.5}, "more than total_cpu_s"),
+        ({"said_cpu_s": -5.0}, "said_cpu_s is -5.0"),
+        ({"error": -1.0}, "error is -1.0"),
+        ({"solved": 2}, "solved is 2"),
+        ({"merit": "foo"}, "merit is 'foo'"),
+        ({"start": "hot"}, "start is 'hot'"),
+        ({"time_limit": None}, "has no time_limit"),
+        ({"time_limit": math.inf}, "time_limit is inf"),
+        ({"wall_limit": -1.0}, "wall_limit is -1.0"),
+        ({"tol": 0.0}, "tol is 0.0"),
+        ({"nc": None}, "has no nc"),
+        ({"started": None}, "has no started"),
+        ({"started": 1e300}, "which is to come"),
+        ({"started": math.nan}, "started is nan"),
+        ({"solver_name": "mine"}, "which is another solver"),
+        ({"status": "infeasible", "key": "another"}, "proven to have no solution"),
+        ({"node": "another"}, "is of a machine that the metadata lack"),
+    ],
+    ids=str,
+)
+def test_what_no_run_can_be_is_refused(changes: dict[str, Any], said: str, tmp_path: Path) -> None:
+    wrong = results.verify(changed(packed(tmp_path), tmp_path / "other", changes))
+    assert said in "\n".join(wrong)
+    assert len(wrong) == 1
+
+
+def test_a_run_is_there_once_whatever_its_key_says(tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    part = packed(tmp_path)
+    rows = pq.read_table(part).to_pylist()
+    again = rows[1] | {"key": "another", "cpu_s": 1e-9}
+    said = results.verify(changed(part, tmp_path / "other", again))
+    assert said == ["row 1: the run " + rows[1]["key"] + " is there twice"]
+    # and so in all parts together
+    changed(part, tmp_path / "parts", {"status": "stalled", "solved": 0})
+    said_of_all = invoke("results", "verify", "--in", tmp_path / "parts", code=1).output
+    assert f"the run {rows[0]['key']} is in small-" in said_of_all
+
+
+def test_machines_of_one_processor_stay_apart(tmp_path: Path) -> None:
+    """Each has times and a calibration of its own."""
+    path = store(tmp_path / "both.sqlite", facts("one", 1.0), ["nsgs"])
+    store(path, facts("two", 3.0), ["apgd"])
+    with bench.Store(path) as opened:
+        part = results.pack(opened, tmp_path / "parts", "small")
+    assert part is not None
+    assert results.verify(part) == []
+    (found,) = results.shards(tmp_path / "parts")
+    names = {"some processor (1)", "some processor (2)"}
+    assert found.machines.keys() == names
+    assert {row["node"] for row in results.rows_of(part)} == names
+    with results.alone([part]) as joined, bench.Store(joined.path) as opened:
+        cpu = {row["solver"]: row["cpu_s"] for row in opened.table()}
+    assert max(cpu.values()) / min(cpu.values()) == pytest.approx(3.0)
+
+
+def test_runs_of_a_larger_limit_count_on_the_board_and_smaller_ones_are_told(
+    tmp_path: Path,
+) -> None:
+    parts = tmp_path / "parts"
+    packed(tmp_path, speed=1.0)  # nsgs and apgd, 10 s
+    own = Record(
+        "converged", cpu_s=0.02, total_cpu_s=0.02, merits={"error": 0.0, "natural": 0.0},
+        machine=facts("theirs", 1.0), started=1.7e9,
+    )  # fmt: skip
+    for solver, limit in (("bb", 60.0), ("admm", 5.0)):
+        plan = {**PLAN, "solvers": [solver], "time_limit": limit, "wall_limit": 7.0 * limit}
+        jobs = bench.Campaign.of(plan).plan()
+        with bench.Store(tmp_path / f"{solver}.sqlite") as opened:
+            slow = replace(own, cpu_s=30.0, total_cpu_s=30.0)
+            opened.add_all([(jobs[0], slow if limit > 10 else own), *((j, own) for j in jobs[1:])])
+            assert results.pack(opened, parts, "small", "fast") is not None
+    told: list[str] = []
+    rows = results.leaders(results.shards(parts), told.append)
+    solved = {(row["solver"], row["solved"]) for row in rows}
+    assert solved == {("nsgs", 4), ("apgd", 4), ("bb", 3), ("bb", 4)}
+    assert told == ["small: admm is left out, with a limit of 5 s or less: most solvers had 10 s"]
+    for row in rows:
+        low, high = map(float, row["95 % interval"].split(" to "))
+        assert low - 0.01 <= row["share"] <= high + 0.01
+        assert row["machine"] == "fast"
+
+
+def test_a_set_that_does_not_compare_does_not_stop_the_others(tmp_path: Path) -> None:
+    part = packed(tmp_path)
+    changed(part, tmp_path / "parts", {"key": "another", "repeat": 7, "merit": "natural"})
+    other = store(tmp_path / "other.sqlite", facts("theirs", 2.0), ["bb"])
+    with bench.Store(other) as opened:
+        assert results.pack(opened, tmp_path / "parts", "whole", "fast") is not None
+    said = invoke("results", "leaders", "--in", tmp_path / "parts", code=1).output
+    assert "small: " in said
+    assert "whole" in said
 
 
 @pytest.mark.parametrize("name", ["tol", "solver", "status", "hash", "history", "cpu_s"])
@@ -454,14 +569,25 @@ def test_published_runs_count_under_a_smaller_limit(tmp_path: Path) -> None:
         rows = [row for row in opened.table() if row["solver"] != "ppa-nsn"]
     assert {(row["status"], row["time_limit"]) for row in rows} == {("time_limit", 1.0)}
     assert len(rows) == 16
+    # mine is 100 s: 10 s count for all, and mine took longer on one problem
     larger = {**plan, "time_limit": 100.0}
+    slow = replace(own, cpu_s=50.0)
     with bench.Store(tmp_path / "larger.sqlite") as opened:
-        opened.add_all([(job, own) for job in bench.Campaign.of(larger).plan()])
+        jobs = bench.Campaign.of(larger).plan()
+        opened.add_all([(jobs[0], slow), *((job, own) for job in jobs[1:])])
     with (
-        pytest.raises(results.BesideError, match="limits or larger"),
-        results.beside(tmp_path / "larger.sqlite", [part]),
+        results.beside(tmp_path / "larger.sqlite", [part]) as found,
+        bench.Store(found.path) as opened,
     ):
-        pass
+        assert "own runs under the smaller limit" in str(found)
+        assert found.lowered == len(jobs)
+        rows = list(opened.table())
+        assert opened.faults() == []
+    assert {row["time_limit"] for row in rows} == {10.0}
+    mine_now = [row["status"] for row in rows if row["solver"] == "ppa-nsn"]
+    assert mine_now.count("time_limit") == 1
+    assert mine_now.count("converged") == len(jobs) - 1
+    assert len(rows) == len(jobs) + 16
 
 
 @pytest.mark.parametrize(("name", "label"), [("slow", "slow"), ("fast", "fast (2)")])

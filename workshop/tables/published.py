@@ -30,7 +30,7 @@ from fclib.bench.calibration import Calibration, calibration_in
 from fclib.bench.comparison import Array, Costs, odds, words_in
 from fclib.bench.table import Table
 from fclib.collections import set_index
-from fclib.results.boards import CHOSEN_FROM, PART_OF, at_one_limit, by_name, digests_of, sources
+from fclib.results.boards import CHOSEN_FROM, PART_OF, by_name, digests_of, sources
 from workshop.tables import _results, problem_facts
 from workshop.tables.campaign import HINDSIGHT, beside_siconos
 
@@ -144,7 +144,7 @@ def set_of(name: str, shards: Sequence[results.Shard]) -> Set | None:
         return None
     # only its problems, so that a solver has no version in its name if others had another one
     with results.alone([shard.path for shard in shards], own) as joined:
-        rows = at_one_limit(name, profiles.load(joined.path))
+        rows = profiles.load(joined.path)
     every = profiles.gather(rows)
     return Set(name, shards, rows, every, comparison.compared(every), str(joined))
 

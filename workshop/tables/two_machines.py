@@ -60,7 +60,7 @@ def rows_of(
     rows = []
     for solver in first:
         own, other = first[solver], second.get(solver, {})
-        both = [key for key in own if min(own[key], other.get(key, 0.0)) >= least]
+        both = [key for key in own.keys() & other.keys() if min(own[key], other[key]) >= least]
         if not both:
             continue
         mean = float(np.exp(np.mean([np.log(other[key] / own[key]) for key in both])))
@@ -80,6 +80,8 @@ def main() -> None:
     first, second = map(calibration_of, own.stores)
     times = [times_of(path) for path in own.stores]
     rows = rows_of(times[0], times[1], ratio_of(second, first), own.least)
+    if not rows:
+        raise SystemExit(f"no solver solves a problem in both that takes {own.least:g} s")
     for row in rows:
         print("  ".join(f"{value!s:>16}" for value in row.values()))
     if own.results:

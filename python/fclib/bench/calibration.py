@@ -32,6 +32,7 @@ TOLERANCE: Final = 1e-6
 SIZES: Final = (3, 30, 300, 1000)  # contacts
 SOLVERS: Final = ("nsgs", "apgd")
 FORMER: Final = ("nsn-ac", "nsip")  # earlier calibrations have them; they no longer count
+LEAST, MOST = 1e-8, 1e4  # [s] bounds of the time of a solve of it, on any machine
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,8 @@ def ratio_of(mine: Calibration, theirs: Calibration) -> Ratio:
     if mine.version != theirs.version or mine.seconds.keys() != theirs.seconds.keys():
         raise ValueError(
             f"calibrations of version {mine.version} and {theirs.version} do not compare"
+            if mine.version != theirs.version
+            else "calibrations of different solves do not compare"
         )
     from scipy import stats
 
@@ -132,7 +135,7 @@ def calibration_in(facts: Mapping[str, Any]) -> Calibration | None:
             for name, value in known["seconds"].items()
             if not str(name).startswith(FORMER)
         }
-        if not seconds or not all(0 < value < np.inf for value in seconds.values()):
+        if not seconds or not all(LEAST < value < MOST for value in seconds.values()):
             return None
         return Calibration(
             int(known["version"]),
@@ -141,5 +144,5 @@ def calibration_in(facts: Mapping[str, Any]) -> Calibration | None:
             seconds,
             float(known["spread"]),
         )
-    except (AttributeError, KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
         return None

@@ -660,7 +660,7 @@ def runs_of(rows: Iterable[Mapping[str, Any]], chosen: Costs) -> Table:
     return kept(runs, fits)
 
 
-def odds(solved: int, of: int) -> tuple[float, float]:
+def odds(solved: float, of: float) -> tuple[float, float]:
     """The ends of Wilson's 95 % interval of the chance to solve one more (Wilson 1927)."""
     z, share = 1.96, solved / of
     middle = (share + z * z / (2 * of)) / (1 + z * z / of)

@@ -1116,6 +1116,22 @@ class Store:
                 self._seal("runs", "id >= ?", first)
         return added
 
+    def lower_limits(self, limits: Mapping[int, float]) -> int:
+        """Let runs, by their numbers, count under smaller limits of CPU time [s].
+
+        One that took longer has failed. Returns the number of runs.
+        """
+        with self.transaction():
+            for run, limit in limits.items():
+                self.db.execute("UPDATE runs SET time_limit = ? WHERE id = ?", (limit, run))
+                self.db.execute(
+                    "UPDATE runs SET status = 'time_limit', solved = 0"
+                    " WHERE id = ? AND solved AND cpu_s > ?",
+                    (run, limit),
+                )
+                self._seal("runs", "id = ?", run)
+        return len(limits)
+
     def machines(self) -> dict[str, dict[str, Any]]:
         """The facts of the machines of all runs, by the column `machine`."""
         return {row["hash"]: object_in(row["facts"]) for row in self._by_number("machine").values()}

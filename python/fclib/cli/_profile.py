@@ -38,19 +38,58 @@ AsMeasured = Annotated[
 
 @contextmanager
 def joined(
-    store: Path | None, beside: Sequence[str], machine: str | None, as_measured: bool
+    store: Path | None,
+    beside: Sequence[str],
+    machine: str | None,
+    as_measured: bool,
+    sets: Sequence[str] = (),
 ) -> Iterator[tuple[Path, str]]:
-    """The store with published runs beside its own, and a note on them; without a store, these."""
+    """The store with published runs beside its own, and a note on them.
+
+    Without a store: the published runs alone, all or those of some sets.
+    """
     from fclib import results
 
     parts = parts_of(beside)
+    digests: set[str] | None = None
+    if sets and store is None:
+        parts, digests = results.of_sets(parts, sets)
     scaled = "" if not as_measured else ", as they were measured on their machine"
     with (
         results.beside(store, parts, machine, scale=not as_measured)
         if store is not None
-        else results.alone(parts)
+        else results.alone(parts, digests)
     ) as found_beside:
         yield found_beside.path, f"{found_beside}{scaled}"
+
+
+def merit_of(store: Path, merit: MeritKind | None) -> MeritKind | None:
+    """The merit by which published runs are compared: both maps, if some bound one alone."""
+    if merit is not None:
+        return merit
+    with Store(store, create=False) as opened:
+        there = {row["merit"] for row in opened.table()}
+    return "both" if len(there) > 1 else None
+
+
+def ready_for(beside: Sequence[str]) -> None:
+    """Whether runs that are made here now can be put beside published ones: asked before them.
+
+    Raises:
+        ShardError: a part is missing or damaged.
+        BesideError: this machine was not calibrated.
+    """
+    from fclib import results
+    from fclib.bench import machine
+    from fclib.bench.calibration import calibration_in
+    from fclib.results.beside import REMEDY
+    from fclib.results.shards import look
+
+    parts = [look(path) for path in parts_of(beside)]
+    here = machine.facts()
+    others = {name for part in parts for name in part.machines}
+    if others != {here.get("node")} and calibration_in(here) is None:
+        raise results.BesideError(f"this machine was not calibrated: {REMEDY}")
 
 
 def parts_of(beside: Sequence[str]) -> list[Path]:

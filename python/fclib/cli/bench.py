@@ -36,7 +36,7 @@ from fclib.cli._output import (
     usage_error,
     words_of,
 )
-from fclib.cli._profile import With, joined, parts_of, print_profile
+from fclib.cli._profile import With, joined, print_profile, ready_for
 from fclib.cli._progress import duration, live
 from fclib.collections import library
 
@@ -155,8 +155,8 @@ def run(
         if not solver:
             raise typer.BadParameter("--with takes the runs of a campaign's solvers: name --solver")
         try:
-            parts_of(beside)
-        except fclib.Error as error:
+            ready_for(beside)
+        except (ImportError, OSError, fclib.Error) as error:
             fail(str(error))
     solver, module = with_files(solver or [], module or [])
     flags: dict[str, Any] = {

@@ -11,7 +11,7 @@ import typer
 
 from fclib.bench import profiles
 from fclib.cli._output import Json, MeritKind, fail, out
-from fclib.cli._profile import AsMeasured, With, joined, print_profile
+from fclib.cli._profile import AsMeasured, With, joined, merit_of, print_profile
 
 Metric = Enum("Metric", {name: name for name in profiles.METRICS}, type=str)  # type: ignore[misc]
 CPU_TIME = Metric("cpu_s")
@@ -133,7 +133,13 @@ def command(
         )
     runs: AbstractContextManager[tuple[Path, str]]
     if beside:
-        runs = joined(store, beside, machine, as_measured)
+        if campaign or (of_set and store is not None):
+            raise typer.BadParameter(
+                "published runs are of no campaign, and have a set only without a store: leave out"
+                f" {'--campaign' if campaign else '--set'}, or --with"
+            )
+        runs = joined(store, beside, machine, as_measured, of_set or ())
+        of_set = None
     elif store is not None:
         runs = nullcontext((store, ""))
     else:
@@ -157,6 +163,8 @@ def command(
     }
     try:
         with runs as (whole, note):
+            if beside and store is None:
+                chosen["merit"] = merit_of(whole, chosen["merit"])
             if figure:
                 from fclib.report import write_figure
 

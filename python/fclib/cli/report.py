@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 import fclib
 from fclib._words import counted
 from fclib.cli._output import MeritKind, err, fail, out
-from fclib.cli._profile import With, joined
+from fclib.cli._profile import With, joined, merit_of
 
 
 @contextmanager
@@ -112,6 +112,8 @@ def command(
             if beside:
                 own = stores[0] if stores else None
                 whole, note = stack.enter_context(joined(own, beside, machine, as_measured=False))
+                if own is None and (judged := merit_of(whole, merit.value if merit else None)):
+                    merit = MeritKind(judged)
                 stores = [whole]
             if stores:
                 campaigns = stack.enter_context(

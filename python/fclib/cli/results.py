@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,8 @@ from fclib import bench, results
 from fclib._words import counted
 from fclib.bench.calibration import calibration_in
 from fclib.cli._output import Json, Report, Rows, err, fail, out, words_of
+from fclib.results import boards
+from fclib.results.leaders import of_set
 
 app = typer.Typer(help="Published runs: list, show, verify; submit your own.", no_args_is_help=True)
 
@@ -87,13 +90,22 @@ def show(where: Where = None, as_json: Json = False) -> None:
 def leaders(where: Where = None, as_json: Json = False) -> None:
     """Show the solvers of each set in their order, with version, machine and date."""
     report = Report(as_json)
-    try:
-        for row in results.leaders(parts_of(where)):
-            report.add(row)
-    except (ImportError, fclib.Error) as error:
-        fail(str(error))
+    failed = False
+    for name, parts in boards.sources(boards.by_name(parts_of(where))).items():
+        try:
+            for row in of_set(name, parts, tell):
+                report.add(row)
+        except (ImportError, fclib.Error) as error:
+            failed = True
+            tell(f"{name}: {error}", "red")
     if not as_json:
         out.print(Rows(report.records) if report.records else "no runs are published here")
+    raise typer.Exit(int(failed))
+
+
+def tell(words: str, style: str = "yellow") -> None:
+    """A line on the standard error."""
+    err.print(f"fclib: {words}", style=style, highlight=False, markup=False)
 
 
 @app.command()
@@ -113,6 +125,9 @@ def verify(
     paths = files or sorted(folder_of(where).glob("*.parquet"))
     if not paths:
         fail("there is no part to check")
+    for folder in problems or ():
+        if not folder.is_dir():
+            fail(f"{folder}: is no folder")
     for path in paths:
         record: dict[str, Any] = {"part": str(path)}
         try:
@@ -123,21 +138,33 @@ def verify(
                 record |= {"solutions judged": counts["ok"] + counts["wrong"]}
                 record |= {"without a problem": counts["no problem"]}
                 wrong += [
-                    f"{row['problem']} by {row['solver']} to {row['tol']:g}: the error is"
-                    f" {row['error']:.3g}, and the part says {row['said']:.3g}"
+                    f"{row['problem']} by {row['solver']} to {row['tol']:g}: {reason(row)}"
                     for row in verdicts
-                    if row["status"] == "wrong"
+                    if row["status"] != "ok"
                 ]
-        except (ImportError, fclib.Error) as error:
+        except (ImportError, OSError, fclib.Error) as error:
             wrong = [str(error).removeprefix(f"{path}: ")]
         report.add({**record, "status": "wrong" if wrong else "ok"}, not wrong)
         for word in wrong[:10]:
             err.print(f"fclib: {path}: {word}", style="red", highlight=False)
         if len(wrong) > 10:
             err.print(f"fclib: {path}: {len(wrong) - 10} more", style="red")
+    doubled = results.twice(paths) if not report.failed else []
+    for word in doubled[:10]:
+        tell(word, "red")
     if not as_json:
         out.print(Rows(report.records))
-    raise typer.Exit(int(report.failed))
+    raise typer.Exit(int(report.failed or bool(doubled)))
+
+
+def reason(row: Mapping[str, Any]) -> str:
+    """Why a solution of a part is not what it says."""
+    if row["status"] == "no problem":
+        return "no file of the folders has its problem, so it is not judged"
+    if row["error"] is None:
+        return f"is no solution of its problem: {row['why']}"
+    said = "nothing" if row["said"] is None else f"{row['said']:.3g}"
+    return f"the error is {row['error']:.3g}, and the part says {said}"
 
 
 @app.command()
@@ -214,9 +241,16 @@ def submit(
     """
     try:
         with bench.Store(store, create=False) as opened:
-            path = results.submit(opened, where, name, machine)
+            own = {float(row["time_limit"]) for row in opened.table()}
+            published = results.shards(found) if (found := results.folder()) else []
+            path = results.submit(opened, where, name, machine, published)
     except (ImportError, fclib.Error) as error:
         fail(str(error))
     except OSError as error:
         fail(words_of(error))
+    if own and published and (usual := boards.usual_limit(name, published)) > max(own):
+        tell(
+            f"the limit of these runs is {max(own):g} s. The leaderboard of {name} compares under"
+            f" {usual:g} s, and leaves them out: run them with --time-limit {usual:g}"
+        )
     out.print(str(path), highlight=False)

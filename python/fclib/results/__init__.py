@@ -14,8 +14,9 @@ checkout.
 
 from fclib._stored import published_runs as folder
 from fclib.results.beside import BesideError, Joined, alone, beside
+from fclib.results.boards import of_sets
 from fclib.results.leaders import leaders
-from fclib.results.shards import Shard, ShardError, pack, rows_of, shards, unpack, verify
+from fclib.results.shards import Shard, ShardError, pack, rows_of, shards, twice, unpack, verify
 from fclib.results.submission import judged, submit
 
 __all__ = [
@@ -28,10 +29,12 @@ __all__ = [
     "folder",
     "judged",
     "leaders",
+    "of_sets",
     "pack",
     "rows_of",
     "shards",
     "submit",
+    "twice",
     "unpack",
     "verify",
 ]

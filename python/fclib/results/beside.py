@@ -6,12 +6,13 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
 
 from fclib import _core
+from fclib._words import counted
 from fclib.bench.calibration import Calibration, Ratio, calibration_in, ratio_of
 from fclib.bench.store import Store
 from fclib.results.shards import Shard, ShardError, look, rows_of
@@ -32,10 +33,16 @@ class Joined:
     path: Path  # of the store
     runs: int  # published ones
     ratios: Mapping[str, Ratio]  # factor of the times of each published machine
+    lowered: int = 0  # runs of the store that count under the smaller limit of published ones
+    short: Mapping[str, float] = field(default_factory=dict)
+    """The largest limit [s] of each solver of which a run was left out for its smaller limit."""
 
     def __str__(self) -> str:
         words = [f"times of {node} x {ratio}" for node, ratio in self.ratios.items()]
-        return f"{self.runs} published runs; {'; '.join(words) or 'times as measured'}"
+        text = f"{self.runs} published runs; {'; '.join(words) or 'times as measured'}"
+        if self.lowered:
+            text += f"; {counted(self.lowered, 'own run')} under the smaller limit of these"
+        return text
 
 
 @contextmanager
@@ -44,10 +51,11 @@ def beside(
 ) -> Iterator[Joined]:
     """A temporary store with the runs of a store, and the published ones of the same problems.
 
-    The published runs of a problem at a tolerance are taken if the store has such a run, and its
-    limit is no larger than theirs. A time on another machine becomes the time on this one: it is
-    multiplied by the ratio of the two calibrations. The limit is that of the store: a run that
-    would take longer here has failed. `replaced` versions are left out.
+    The published runs of a problem at a tolerance are taken if the store has such a run. All count
+    under one limit: that of the store, or that of most published solvers if it is smaller. A run
+    that takes longer has failed, and a published one with a smaller limit is left out. A time on
+    another machine becomes the time on this one: it is multiplied by the ratio of the two
+    calibrations. `replaced` versions are left out.
 
     Args:
         mine: the store.
@@ -71,10 +79,26 @@ def beside(
             looked = [look(part) for part in parts]
             machines = Machines(looked)
 
+            theirs = usual_limits(row for row in _keys_of(looked) if kind_of(row) in limits)
+            lower = {
+                kind: (theirs[kind], wall)
+                for kind, (limit, wall) in limits.items()
+                if theirs.get(kind, math.inf) < limit
+            }
+            limits |= lower
+            lowered = joined.lower_limits(
+                {
+                    row["run"]: lower[kind_of(row)][0]
+                    for row in joined.table()
+                    if row["node"] == node and row["time_limit"] > limits[kind_of(row)][0]
+                    and kind_of(row) in lower
+                }
+            )  # fmt: skip
+
             def counts(row: Mapping[str, Any]) -> bool:
                 return bool(row["time_limit"] >= limits.get(kind_of(row), NONE)[0])
 
-            # all of them are compared under the limits of the store
+            # all of them are compared under one limit
             older = replaced(
                 row | {"time_limit": limits[kind_of(row)][0]}
                 for row in _keys_of(looked)
@@ -91,10 +115,10 @@ def beside(
                 taken += joined.add_rows(rows, {node: facts})
         if not taken:
             raise BesideError(
-                f"{mine}: there is no published run of its problems at its tolerances, under its"
-                " limits or larger ones, that it does not have itself"
+                f"{mine}: there is no published run of its problems at its tolerances, by its merit"
+                " and number of threads, that it does not have itself"
             )
-        yield Joined(path, taken, {k: v for k, v in ratios.items() if v.mean != 1})
+        yield Joined(path, taken, {k: v for k, v in ratios.items() if v.mean != 1}, lowered)
 
 
 @contextmanager
@@ -102,6 +126,8 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
     """A temporary store with published runs alone, their times on the scale of one machine.
 
     This machine is the one with most runs, and its name is that of the first of the parts on ties.
+    The runs of a problem to a tolerance count under the limit that most solvers had (on ties the
+    larger): one that takes longer has failed, and one with a smaller limit is left out.
     `replaced` versions are left out. `digests` names the problems; without it they are all taken.
 
     Raises:
@@ -122,7 +148,21 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
     def counts_here(row: Mapping[str, Any]) -> bool:
         return digests is None or row["hash"] in digests
 
-    older = replaced(filter(counts_here, _keys_of(found)))
+    limits = usual_limits(filter(counts_here, _keys_of(found)))
+    walls: dict[tuple[Any, ...], float] = defaultdict(float)
+    short: dict[str, float] = defaultdict(float)
+
+    def fits(row: Mapping[str, Any]) -> bool:
+        return counts_here(row) and row["time_limit"] >= limits[kind_of(row)]
+
+    for row in filter(counts_here, _keys_of(found)):
+        if fits(row):
+            walls[kind_of(row)] = max(walls[kind_of(row)], row["wall_limit"] or 0.0)
+        else:
+            short[row["solver"]] = max(short[row["solver"]], row["time_limit"])
+    older = replaced(
+        row | {"time_limit": limits[kind_of(row)]} for row in _keys_of(found) if fits(row)
+    )
     with TemporaryDirectory(prefix="fclib-results-") as temporary:
         path = Path(temporary) / "published.sqlite"
         with Store(path) as joined:
@@ -131,11 +171,11 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
                     row,
                     ratios[one.path].get(row["node"]),
                     node,
-                    (row["time_limit"], row["wall_limit"]),
+                    (limits[kind_of(row)], walls[kind_of(row)]),
                 )
                 for one in found
                 for row in rows_of(one.path)
-                if counts_here(row) and version_of(row) not in older
+                if fits(row) and version_of(row) not in older
             )
             taken = joined.add_rows(rows, {node: facts})
         named = {
@@ -143,7 +183,7 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
             for one in found
             for name, ratio in ratios[one.path].items()
         }
-        yield Joined(path, taken, named)
+        yield Joined(path, taken, named, short=short)
 
 
 Kind: TypeAlias = tuple[str, Calibration | None]
@@ -210,6 +250,17 @@ def version_of(row: Mapping[str, Any]) -> tuple[Any, ...]:
     return tuple(row[name] for name in VERSION)
 
 
+def usual_limits(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[Any, ...], float]:
+    """The limit of CPU time [s] of each kind of runs: that of most solvers, on ties the larger."""
+    solvers: dict[tuple[Any, ...], dict[float, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for row in rows:
+        solvers[kind_of(row)][row["time_limit"]].add(row["solver"])
+    return {
+        kind: max(found, key=lambda limit: (len(found[limit]), limit))
+        for kind, found in solvers.items()
+    }
+
+
 def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
     """The versions of solvers that a comparison leaves out, as `version_of` names them.
 
@@ -236,7 +287,7 @@ def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
 
 def _keys_of(parts: Iterable[Shard]) -> Iterator[dict[str, Any]]:
     """What `replaced` reads of the runs of parts."""
-    names = (*KIND, *VERSION, "time_limit", "started")
+    names = (*KIND, *VERSION, "time_limit", "wall_limit", "started")
     return (row for part in parts for row in rows_of(part.path, names))
 
 
@@ -247,6 +298,8 @@ def _wanted(
     runs = list(store.table())
     nodes = sorted({str(row["node"]) for row in runs})
     node = machine or (nodes[0] if len(nodes) == 1 else "")
+    if not nodes:
+        raise BesideError(f"{mine}: has no run")
     if node not in nodes:
         what = f"has no run of {node}" if machine else "has runs of several machines"
         raise BesideError(f"{mine}: {what}; choose one by --machine: {', '.join(nodes)}")

@@ -6,16 +6,13 @@ their parts. Of all of them, only the problems of the set count.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from fclib.bench.comparison import numbers_in
-from fclib.bench.table import Table
 from fclib.collections import set_index
-from fclib.results.shards import Shard, rows_of
+from fclib.results.shards import Shard, ShardError, look, rows_of
 
 # sets that were chosen from runs, and the parts that have these, beside parts of their own name
 CHOSEN_FROM: Final = {
@@ -59,9 +56,22 @@ def digests_of(name: str, parts: Sequence[Shard]) -> set[str]:
     return ran & {choice.digest for choice in set_index.choices(whole)}
 
 
-def at_one_limit(name: str, runs: Table) -> Table:
-    """The runs of a set that was chosen from runs: those at the limit that most of them have."""
-    limits, counts = np.unique(numbers_in(runs, "time_limit"), return_counts=True)
-    if name not in CHOSEN_FROM or not limits.size:
-        return runs
-    return runs.where(numbers_in(runs, "time_limit") == limits[counts.argmax()])
+def of_sets(paths: Iterable[Path], names: Sequence[str]) -> tuple[list[Path], set[str]]:
+    """The parts that have runs of some sets, and the digests of their problems.
+
+    Raises:
+        ShardError: no runs of such a set are in the parts.
+    """
+    groups = sources(by_name(map(look, paths)))
+    for name in names:
+        if name not in groups:
+            raise ShardError(f"{name}: no published run is of it; there is: {', '.join(groups)}")
+    parts = {part.path: None for name in names for part in groups[name]}
+    return list(parts), {one for name in names for one in digests_of(name, groups[name])}
+
+
+def usual_limit(name: str, parts: Iterable[Shard]) -> float:
+    """The limit of CPU time [s] that most runs of a set have; 0 without runs."""
+    own = sources(by_name(parts)).get(name, ())
+    limits = Counter(row["time_limit"] for one in own for row in rows_of(one.path, ("time_limit",)))
+    return max(limits, key=lambda limit: limits[limit], default=0.0)

@@ -7,35 +7,43 @@ machines are brought to the scale of one by their calibrations.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import defaultdict
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Container, Sequence
+from typing import Any, TypeAlias
 
 from fclib.bench import comparison, profiles
 from fclib.bench.comparison import in_order, numbers_in, odds, words_in
 from fclib.results.beside import alone
-from fclib.results.boards import at_one_limit, by_name, digests_of, sources
+from fclib.results.boards import by_name, digests_of, sources
 from fclib.results.shards import Shard, rows_of
 
+Tell: TypeAlias = Callable[[str], object]
 WEIGH: profiles.Weigh = "families"
 
 
-def leaders(parts: Sequence[Shard]) -> list[dict[str, Any]]:
+def leaders(parts: Sequence[Shard], tell: Tell | None = None) -> list[dict[str, Any]]:
     """A row for each set, tolerance and solver, the best first.
 
-    `of` has the problems that a solver has run and takes; the interval is Wilson's, of the chance
-    to solve one more of the set. `mean [s]` is the shifted geometric mean of CPU times.
+    `of` has the problems that a solver has run and takes. `share` is the share of solved ones, each
+    family with the same weight. Its interval is Wilson's, for as many problems as these weights
+    are worth (Kish 1965). `mean [s]` is the shifted geometric mean of CPU times.
+
+    Args:
+        parts: the parts.
+        tell: is called with a line for each solver that is left out of a set.
 
     Raises:
         BesideError: parts of several machines, of which one was not calibrated.
         ShardError: a part cannot be read.
         ProfileError: there is nothing to compare.
     """
-    return [row for name, own in sources(by_name(parts)).items() for row in of_set(name, own)]
+    groups = sources(by_name(parts))
+    return [row for name, own in groups.items() for row in of_set(name, own, tell)]
 
 
-def of_set(name: str, parts: Sequence[Shard]) -> list[dict[str, Any]]:
+def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[dict[str, Any]]:
     """The rows of a set."""
     digests = digests_of(name, parts)
     if not digests:
@@ -46,16 +54,26 @@ def of_set(name: str, parts: Sequence[Shard]) -> list[dict[str, Any]]:
             if row["hash"] in digests:
                 measured[row["solver"]].add(row["node"])
     with alone([part.path for part in parts], digests) as joined:
-        runs = at_one_limit(name, profiles.load(joined.path))
+        runs, short = profiles.load(joined.path), joined.short
     costs = comparison.compared(profiles.gather(runs))
     solver, started = words_in(runs, "solver"), numbers_in(runs, "started")
+    labels = {found: named(found, measured) for found in map(str, solver.present())}
+    for one in sorted(short.keys() - set(labels.values())):
+        if tell is None:
+            break
+        tell(
+            f"{name}: {one} is left out, with a limit of {short[one]:g} s or less: most solvers had"
+            f" {max(numbers_in(runs, 'time_limit')):g} s"
+        )
+    weights = costs.weights(WEIGH)
     found = []
     for row in profiles.summary(costs, weigh=WEIGH):
         if row["solver"] == profiles.VIRTUAL_BEST:
             continue
         own = runs.where(solver == row["solver"])
-        label = row["solver"].partition(" (")[0]
-        low, high = odds(row["solved"], row["of"])
+        worth = 1 / float((weights[:, costs.solvers.index(row["solver"])] ** 2).sum() or math.inf)
+        share = min(1.0, row["share"])
+        low, high = odds(share * worth, worth)
         found.append(
             {
                 "set": name,
@@ -64,14 +82,21 @@ def of_set(name: str, parts: Sequence[Shard]) -> list[dict[str, Any]]:
                 "version": ", ".join(str(word) for word in in_order(words_in(own, "version"))),
                 "solved": row["solved"],
                 "of": row["of"],
-                "share": row["share"],
+                "share": share,
                 "95 % interval": f"{low:.2f} to {high:.2f}",
                 "mean [s]": row["mean"],
-                "machine": ", ".join(sorted(measured[label])),
+                "machine": ", ".join(sorted(measured[labels[row["solver"]]])),
                 "date": day(max(started[solver == row["solver"]], default=0.0)),
             }
         )
     return found
+
+
+def named(label: str, known: Container[str]) -> str:
+    """The name of a solver without what tells its versions apart."""
+    while label not in known and " (" in label:
+        label = label.rpartition(" (")[0]
+    return label
 
 
 def day(seconds: float) -> str:

@@ -13,6 +13,8 @@ import io
 import json
 import math
 import re
+import time
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -34,7 +36,25 @@ VERSION: Final = 1
 DIGITS: Final = 16  # digits of the file's SHA-256 in its name
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 # columns that each run has
-NEEDED: Final = ("key", "problem", "hash", "solver", "tol", "merit", "status", "solved", "node")
+NEEDED: Final = (
+    *("key", "problem", "hash", "nc", "solver", "solver_name", "options", "version", "origin"),
+    *("tol", "merit", "time_limit", "wall_limit", "threads", "repeat", "start", "started"),
+    *("status", "solved", "node"),
+)
+MERITS: Final = ("both", "natural")
+STARTS: Final = ("cold", "warm")
+# these are finite and not negative, if a run has them
+MEASURED: Final = (
+    *("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s"),
+    *("error", "natural", "scaled_natural", "started"),
+)
+COARSE: Final = 1e-3  # [s] by which clocks may differ
+AHEAD: Final = 86400.0  # [s] by which a clock may be ahead
+# what makes two runs the same one, whatever their keys say
+RUN: Final = (
+    *("hash", "tol", "merit", "start", "sequence", "step", "threads", "repeat", "copy"),
+    *("solver", "options", "version", "time_limit", "memory_limit", "node", "measured"),
+)
 PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
 LEFT: Final = ("run", "campaign", "machine", "message")  # mean nothing elsewhere, or name paths
 REPORTS: Final = (
@@ -174,7 +194,7 @@ def pack(
             f"{store.path}: has runs of {len(nodes)} machines, which need a name each: pack the"
             " store of each machine"
         )
-    public = {key: machine or str(facts.get("cpu") or "?") for key, facts in own.items()}
+    public = names_of(own, machine)
     kinds = store.kinds()
     rows = []
     kept = sampled(store) if solutions else set()
@@ -212,6 +232,27 @@ def pack(
     path = where / f"{name}-{digest[:DIGITS]}.parquet"
     write_bytes(path, content.getvalue())
     return path
+
+
+def names_of(machines: Mapping[str, Mapping[str, Any]], name: str = "") -> dict[str, str]:
+    """The name under which each machine is published: the model of its processor.
+
+    Several machines of one model have numbers. One that was calibrated later is the same machine.
+    """
+    if name:
+        return dict.fromkeys(machines, name)
+    nodes: dict[str, list[str]] = defaultdict(list)  # of each model
+    for facts in machines.values():
+        node, own = str(facts.get("node")), nodes[str(facts.get("cpu") or "?")]
+        if node not in own:
+            own.append(node)
+    found = {}
+    for key, facts in machines.items():
+        model = str(facts.get("cpu") or "?")
+        own = nodes[model]
+        number = own.index(str(facts.get("node"))) + 1
+        found[key] = model if len(own) == 1 else f"{model} ({number})"
+    return found
 
 
 def unpack(parts: Iterable[Shard], store: Store) -> int:
@@ -276,16 +317,40 @@ def verify(path: Path) -> list[str]:
         wrong.append(f"the content is {sha256(path)[:DIGITS]}, and the name says {found[2]}")
     if not own.runs:
         wrong.append("it has no run")
-    keys: set[tuple[str, str]] = set()
+    keys: set[tuple[Any, ...]] = set()
+    runs: set[tuple[Any, ...]] = set()
+    said: dict[str, set[str]] = defaultdict(set)  # the verdicts on each problem
     for number, row in enumerate(rows_of(path)):
         where = f"row {number}"
-        key = row.get("key"), row.get("node")
-        if key in keys:
+        key, run = (row["key"], row["node"]), tuple(row[name] for name in RUN)
+        if key in keys or run in runs:
             wrong.append(f"{where}: the run {key[0]} is there twice")
-        keys.add(key)  # type: ignore[arg-type]
-        if row.get("node") not in own.machines:
-            wrong.append(f"{where}: is of a machine that the metadata lack: {row.get('node')}")
+        keys.add(key)
+        runs.add(run)
+        if row["node"] not in own.machines:
+            wrong.append(f"{where}: is of a machine that the metadata lack: {row['node']}")
+        if is_solved(row["status"]):
+            said[row["hash"]].add(row["status"])
         wrong += [f"{where}: {word}" for word in contradictions(row)]
+    wrong += [
+        f"problem {digest}: is solved by some runs, and by others proven to have no solution"
+        for digest, statuses in said.items()
+        if len(statuses) > 1
+    ]
+    unused = own.machines.keys() - {node for _, node in keys}
+    return wrong + [f"the metadata have a machine of no run: {name}" for name in sorted(unused)]
+
+
+def twice(paths: Iterable[Path]) -> list[str]:
+    """The runs that several parts have: which of them counts would depend on the order of files."""
+    first: dict[tuple[Any, ...], Path] = {}
+    wrong = []
+    for path in paths:
+        for row in rows_of(path, ("key", "node")):
+            key = row["key"], row["node"]
+            other = first.setdefault(key, path)
+            if other != path:
+                wrong.append(f"{path}: the run {key[0]} is in {other.name} too")
     return wrong
 
 
@@ -300,13 +365,31 @@ def contradictions(row: Mapping[str, Any]) -> list[str]:
     wrong = [f"has no {name}" for name in NEEDED if row[name] is None]
     if wrong:
         return wrong
-    error, tol = error_of(row), row["tol"]
-    if row["status"] == "converged" and not (error is not None and error <= tol):
-        wrong.append(f"is converged, and its error {error} is not within {tol}")
-    if bool(row["solved"]) != is_solved(row["status"]):
-        wrong.append(f"has the status {row['status']}, and solved is {row['solved']}")
-    for name in ("cpu_s", "wall_s", "total_cpu_s"):
+    error, tol, limit = error_of(row), row["tol"], row["time_limit"]
+    for name, known in (("merit", MERITS), ("start", STARTS), ("solved", (0, 1))):
+        if row[name] not in known:
+            wrong.append(f"{name} is {row[name]!r}, which is none of {', '.join(map(str, known))}")
+    for name in ("tol", "time_limit", "wall_limit"):
+        if not 0 < row[name] < math.inf:
+            wrong.append(f"{name} is {row[name]}")
+    for name in MEASURED:
         value = row[name]
         if value is not None and not (0 <= value < math.inf):
             wrong.append(f"{name} is {value}")
+    if wrong:
+        return wrong
+    if row["status"] == "converged" and not (error is not None and error <= tol):
+        wrong.append(f"is converged, and its error {error} is not within {tol}")
+    solved = is_solved(row["status"])
+    if bool(row["solved"]) != solved:
+        wrong.append(f"has the status {row['status']}, and solved is {row['solved']}")
+    cpu, whole = row["cpu_s"], row["total_cpu_s"]
+    if solved and not (cpu is not None and cpu <= limit):
+        wrong.append(f"is solved in {cpu} s, and its limit is {limit:g} s")
+    if cpu is not None and whole is not None and cpu > whole + COARSE + COARSE * whole:
+        wrong.append(f"cpu_s is {cpu}, and more than total_cpu_s, which is {whole}")
+    if row["started"] > time.time() + AHEAD:
+        wrong.append(f"was started at {row['started']:.0f} s since 1970, which is to come")
+    if row["solver"] in _core.fingerprints() and row["solver_name"] != row["solver"]:
+        wrong.append(f"calls {row['solver_name']} {row['solver']}, which is another solver")
     return wrong

@@ -15,10 +15,11 @@ import numpy as np
 from fclib import _core, _digest
 from fclib._judge import judge
 from fclib._words import counted
+from fclib.bench.calibration import calibration_in
 from fclib.bench.problems import SUFFIXES
 from fclib.bench.store import Store
 from fclib.collections.ratings import solution_of
-from fclib.results.shards import VECTORS, ShardError, error_of, pack, rows_of
+from fclib.results.shards import VECTORS, Shard, ShardError, error_of, pack, rows_of, verify
 
 ENOUGH: Final = 5  # solutions that a submission has at least
 # a recomputed error may differ so much from the stored one, relative and absolute: another machine
@@ -26,21 +27,39 @@ ENOUGH: Final = 5  # solutions that a submission has at least
 SAME: Final = (1e-3, 1e-14)
 
 
-def submit(store: Store, where: Path, name: str, machine: str = "") -> Path:
+def submit(
+    store: Store, where: Path, name: str, machine: str = "", there: Iterable[Shard] = ()
+) -> Path:
     """Write a store as one file, with the solutions of a sample.
 
+    Args:
+        store: the runs that are handed in.
+        where: folder of the file.
+        name: of the set that they are of.
+        machine: as for `pack`.
+        there: published parts, whose runs, which `unpack` may have put there, are left out.
+
     Raises:
-        ShardError: it has too few solutions, or no run; and as `pack`.
+        ShardError: it has too few solutions, no run, runs of a machine that was not calibrated, or
+            what `verify` does not take; and as `pack`.
     """
+    if any(calibration_in(facts) is None for facts in store.machines().values()):
+        raise ShardError(
+            f"{store.path}: has runs of a machine that was not calibrated before, which do not"
+            " compare with those of others: `fclib bench --calibrate`, and then run it anew"
+        )
     count = len(store.with_solutions())
     if count < ENOUGH:
         raise ShardError(
             f"{store.path}: has {counted(count, 'solution')}, and {ENOUGH} are asked for: a"
             " campaign with `repeated` below 1 keeps those of the problems that it repeats"
         )
-    path = pack(store, where, name, machine, solutions=True)
+    path = pack(store, where, name, machine, there, solutions=True)
     if path is None:
-        raise ShardError(f"{store.path}: has no run")
+        raise ShardError(f"{store.path}: has no run that is not published yet")
+    if wrong := verify(path):
+        path.unlink()
+        raise ShardError(f"{store.path}: {wrong[0]}")
     return path
 
 
@@ -56,8 +75,10 @@ def judged(path: Path, folders: Iterable[Path]) -> list[dict[str, Any]]:
         fclib.Error: a file of a problem cannot be read.
     """
     rows = [row for row in rows_of(path) if row.get(VECTORS[0]) is not None]
-    if not rows:
-        raise ShardError(f"{path}: has no solution to judge")
+    if len(rows) < ENOUGH:
+        raise ShardError(
+            f"{path}: has {counted(len(rows), 'solution')} to judge, and {ENOUGH} are asked for"
+        )
     files = files_by_digest({row["hash"]: row["problem"] for row in rows}, folders)
     return [verdict(row, files.get(row["hash"])) for row in rows]
 
@@ -68,14 +89,20 @@ def verdict(row: dict[str, Any], file: Path | None) -> dict[str, Any]:
     if file is None:
         return {**own, "said": error_of(row), "error": None, "status": "no problem"}
     problem = _core.read(file, row["kind"] or None)
-    r, multipliers = (
-        None if row[name] is None else np.frombuffer(row[name], "<f8") for name in VECTORS
-    )
-    found = judge(problem, solution_of(r, multipliers), row["tol"], row["merit"])
     said = error_of(row)
+    try:
+        r, multipliers = (vector(row.get(name)) for name in VECTORS)
+        found = judge(problem, solution_of(r, multipliers), row["tol"], row["merit"])
+    except (TypeError, ValueError, _core.Error) as error:  # no doubles, or of another number
+        return {**own, "said": said, "error": None, "status": "wrong", "why": str(error)}
     same = said is not None and abs(found.error - said) <= SAME[0] * said + SAME[1]
     status = "ok" if found.ok and same else "wrong"
     return {**own, "said": said, "error": found.error, "status": status}
+
+
+def vector(content: Any) -> Any:
+    """The doubles of an entry; None if there is none. TypeError, ValueError: it is no vector."""
+    return None if content is None else np.frombuffer(content, "<f8")
 
 
 def files_by_digest(wanted: dict[str, str], folders: Iterable[Path]) -> dict[str, Path]:

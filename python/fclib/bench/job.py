@@ -29,7 +29,8 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "inaccurate": "said to be done, and the recomputed error is above the tolerance; "
         "or said that there is no solution, and proved nothing",
         "invalid": "returned numbers that are not finite",
-        "nothing": "returned no solution: none at all, or the starting point as it was",
+        "nothing": "returned no solution: none at all, the starting point as it was, or one worse "
+        "than no reactions",
         "garbage": "returned what is no solution of this problem: another shape, another format",
         "unsuitable": "has declared that it does not take problems of this kind",
         "error": "raised an exception, or ended with an exit status other than 0",

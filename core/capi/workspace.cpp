@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "capi/errors.hpp"
 #include "capi/status.hpp"
@@ -16,8 +18,6 @@ struct fclib_workspace {
 namespace fclib::c {
 
 namespace {
-
-static_assert(sizeof(size_t) == sizeof(std::int64_t));
 
 MatrixView view_of(const fclib_matrix& c) {
   MatrixView view;
@@ -41,6 +41,7 @@ MatrixView view_of(const fclib_matrix& c) {
     view.nnz = c.nz >= 0           ? c.nz
                : view.p != nullptr ? view.p[view.storage == Storage::csc ? view.cols : view.rows]
                                    : 0;
+    if (view.nnz > c.nzmax && c.nz >= 0) fail("problem->W->nz", "is more than nzmax");
     if (c.nz < 0 && view.nnz > c.nzmax) fail("problem->W->nzmax", "is less than the pointers say");
     if (c.nz < 0 && view.nnz == 0 && c.nzmax > 1 && c.x != nullptr) {
       require_counted({c.x, static_cast<std::size_t>(c.nzmax)}, 0, "problem->W->p");
@@ -64,7 +65,9 @@ int solve(fclib_workspace* workspace, const fclib_local* c, const size_t* contac
     if (joints) fail("problem", "has bilateral constraints, which a workspace does not take");
     view.W = view_of(given(problem.W, "problem->W"));
     const auto m = static_cast<std::size_t>(view.W.rows);
-    const std::size_t nc = m / static_cast<std::size_t>(view.spacedim);
+    const auto d = static_cast<std::size_t>(view.spacedim);
+    if (m % d != 0) fail("problem->W->m", "is no multiple of spacedim");
+    const std::size_t nc = m / d;
     if (m > 0) {
       view.q = {&given(problem.q, "problem->q"), m};
       view.mu = {&given(problem.mu, "problem->mu"), nc};
@@ -73,8 +76,16 @@ int solve(fclib_workspace* workspace, const fclib_local* c, const size_t* contac
     if (!(tolerance >= 0)) fail("tolerance", "must not be negative");
     Workspace::Settings settings;
     if (tolerance > 0) settings.tolerance = tolerance;
-    const auto* names = reinterpret_cast<const std::int64_t*>(contacts);
-    const Workspace::Answer answer = core.solve(view, {names, names != nullptr ? nc : 0}, settings);
+    // names are as wide as a pointer
+    std::vector<std::int64_t> wide;
+    std::span<const std::int64_t> names;
+    if constexpr (sizeof(size_t) == sizeof(std::int64_t)) {
+      names = {reinterpret_cast<const std::int64_t*>(contacts), contacts != nullptr ? nc : 0};
+    } else if (contacts != nullptr) {
+      wide.assign(contacts, contacts + nc);
+      names = wide;
+    }
+    const Workspace::Answer answer = core.solve(view, names, settings);
     std::copy(answer.r.begin(), answer.r.end(), r);
     if (u != nullptr) std::copy(answer.u.begin(), answer.u.end(), u);
     if (status != nullptr) *status = status_in_c(answer.status);
@@ -103,7 +114,10 @@ int fclib_workspace_solve(fclib_workspace* workspace, const fclib_local* problem
 }
 
 void fclib_workspace_forget(fclib_workspace* workspace) {
-  if (workspace != nullptr) workspace->core.forget();
+  fclib::c::guarded(0, [&] {
+    fclib::c::given(workspace, "workspace").core.forget();
+    return 1;
+  });
 }
 
 }  // extern "C"

@@ -134,7 +134,17 @@ class Runner {
   /// One thread: takes chunks as long as there are some.
   void work(bool polls) {
     // each thread keeps this memory: a caller with one problem at a time allocates nothing either
-    thread_local Way memory;
+    thread_local Way kept;
+    thread_local bool taken = false;
+    // a caller's poll may begin a batch of its own
+    std::optional<Way> own;
+    Way& memory = taken ? own.emplace() : kept;
+    const bool before = std::exchange(taken, true);
+    struct Free {
+      bool& taken;
+      bool before;
+      ~Free() { taken = before; }
+    } const free{taken, before};
     BatchOutcome outcome;
     if (polls && settings_.poll) last_poll_ = now({});
     for (;;) {

@@ -674,7 +674,7 @@ bool SmallSolver<D>::project(double tolerance, double* r, double& change) {
   for (int k = 1; k <= most_sweeps; ++k) {
     change = projected_sweep(r);
     if (SweepRule::is_near(k, change, tolerance) && meets(tolerance, r)) return true;
-    if (!rule.goes_on(k, last, change, tolerance)) return false;
+    if (!rule.goes_on(k, last, change, tolerance) || stopped()) return false;
     last = change;
   }
   return false;
@@ -777,7 +777,7 @@ bool SmallSolver<D>::newton(int attempt, double tolerance, double* r, double& be
   int worse = 0;
   close_ = 0;
   for (int k = 0; k < (1 + attempt) * newton_steps && worse < 3 + 2 * attempt; ++k) {
-    if (!newton_step(weight, r)) break;
+    if (stopped() || !newton_step(weight, r)) break;
     sweep(r);
     if (!solvable_) return false;
     const double now = error(r);
@@ -820,6 +820,7 @@ bool SmallSolver<D>::solve_island(std::size_t k, double tolerance, double* r) {
   }
   if (guessed) {
     if (meets(tolerance, r) || seek(tolerance, r)) return true;
+    if (stopped()) return false;
     for (const Index a : now_) part(r, a).setZero();
   }
   return seek(tolerance, r);
@@ -849,7 +850,7 @@ bool SmallSolver<D>::seek(double tolerance, double* r) {
   const double worth = std::min(4 * costs().newton / costs().exact, most_foreseen);
   const bool alone = now_.size() == 1;
   double close = closeness * tolerance;
-  for (int k = 1; k <= most_sweeps; ++k) {
+  for (int k = 1; k <= most_sweeps && !stopped(); ++k) {
     close_ = alone ? 0.0 : close_of_error_ * std::max(close, closeness_to_change * change);
     change = sweep(r);
     if (!solvable_ || !std::isfinite(change)) return false;

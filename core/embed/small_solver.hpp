@@ -15,8 +15,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "contact/coulomb.hpp"
@@ -78,6 +80,10 @@ class SmallSolver {
     }
   }
 
+  /// From now on a solve gives up once `stop` is true; it is asked after each sweep and each step
+  /// of Newton's method. Empty: never.
+  void stop_if(std::function<bool()> stop) { stop_ = std::move(stop); }
+
   /// Says that the next solve starts from where projected sweeps ended. It makes no more of them.
   void start_behind(const SweptStart& start) {
     iterations_ += start.sweeps;
@@ -103,6 +109,8 @@ class SmallSolver {
 
  private:
   using Contacts = std::span<const Index>;
+
+  [[nodiscard]] bool stopped() const { return stop_ && stop_(); }
 
   /// How the W of the last call was stored, if that is known.
   enum class Pattern { none, triplet, csc, csr, blocks };
@@ -141,6 +149,7 @@ class SmallSolver {
   }
   static Eigen::Map<Vec> part(double* x, Index a) { return Eigen::Map<Vec>(x + D * a); }
 
+  std::function<bool()> stop_;
   Index nc_ = 0;
   const double* q_ = nullptr;
   const double* mu_ = nullptr;

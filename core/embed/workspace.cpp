@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "deadline.hpp"
 #include "embed/contact_judge.hpp"
 #include "embed/memory.hpp"
 #include "solve/driver.hpp"
@@ -14,6 +18,20 @@ namespace {
 
 /// For larger problems, `auto` with its sparse factors is the better choice.
 constexpr std::size_t most_contacts = 400;
+constexpr double poll_interval = 0.1;  // [s]
+
+/// Does something at the end of a block, however it is left.
+template <class Action>
+class Finally {
+ public:
+  explicit Finally(Action action) : action_(std::move(action)) {}
+  ~Finally() { action_(); }
+  Finally(const Finally&) = delete;
+  Finally& operator=(const Finally&) = delete;
+
+ private:
+  Action action_;
+};
 
 [[noreturn]] void refuse(const char* where, const std::string& what) {
   throw Error(ErrorKind::problem, what, where);
@@ -70,7 +88,7 @@ void Workspace::guess(int spacedim, std::span<const std::int64_t> contacts,
   const auto d = static_cast<std::size_t>(spacedim);
   if (known_ == 0 || spacedim != spacedim_) return;
   if (contacts.empty()) {
-    if (!named_ && r.size() == d * known_) std::copy_n(last_.begin(), r.size(), r.begin());
+    if (r.size() == d * known_) std::copy_n(last_.begin(), r.size(), r.begin());
     return;
   }
   if (!named_) return;
@@ -138,7 +156,23 @@ Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& p
   if (const char* wrong = solver.take(problem.W, problem.q.data(), problem.mu.data())) {
     refuse("W", wrong);
   }
+  const Deadline deadline(settings.time_limit);
+  double last_poll = now({});
+  std::optional<Status> ended;  // before a solution was found
+  const auto stops = [&] {
+    if (ended) return true;
+    if (deadline.passed()) {
+      ended = Status::time_limit;
+    } else if (settings.poll && now({}) - last_poll > poll_interval) {
+      last_poll = now({});
+      if (!settings.poll()) ended = Status::interrupted;
+    }
+    return ended.has_value();
+  };
   if (static_cast<std::size_t>(solver.largest()) <= most_contacts) {
+    // a reference takes no memory of its own
+    if (settings.poll || std::isfinite(settings.time_limit)) solver.stop_if(std::ref(stops));
+    const Finally forget([&] { solver.stop_if({}); });
     // the answer has the merit itself, not a bound on it
     answer.error =
         solver.solve(settings.tolerance, r_.data(), [&] { return judge<D>(problem); }, false);
@@ -147,21 +181,26 @@ Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& p
       answer.status = Status::converged;
       return answer;
     }
+    if (stops()) {
+      answer.status = *ended;
+      return answer;
+    }
   }
   static const Solver& whole_way = find_solver("auto");
   fclib::Settings asked;
   asked.tolerance = settings.tolerance;
-  asked.time_limit = settings.time_limit;
+  asked.time_limit = deadline.left();
+  asked.poll = settings.poll;
   Solution start;
   start.r = Eigen::Map<const Vector>(r_.data(), static_cast<Eigen::Index>(D * nc));
   if (!start.r.allFinite()) start.r.resize(0);
-  const Result result = fclib::solve(copied(problem), whole_way, asked, {}, start);
-  answer.by_auto = true;
-  answer.status = result.status;
-  answer.error = result.error;
-  answer.iterations += result.iterations;
-  std::copy(result.solution.r.begin(), result.solution.r.end(), r_.begin());
-  std::copy(result.solution.u.begin(), result.solution.u.end(), u_.begin());
+  whole_ = fclib::solve(copied(problem), whole_way, asked, {}, start);
+  answer.by_auto = &whole_;
+  answer.status = whole_.status;
+  answer.error = whole_.error;
+  answer.iterations += whole_.iterations;
+  std::copy(whole_.solution.r.begin(), whole_.solution.r.end(), r_.begin());
+  std::copy(whole_.solution.u.begin(), whole_.solution.u.end(), u_.begin());
   return answer;
 }
 

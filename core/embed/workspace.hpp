@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <utility>
@@ -9,9 +10,10 @@
 
 #include "embed/matrix_view.hpp"
 #include "embed/small_solver.hpp"
+#include "error.hpp"
 #include "linalg/extended.hpp"
 #include "problems/local.hpp"
-#include "solve/solver.hpp"
+#include "solve/driver.hpp"
 
 namespace fclib {
 
@@ -23,30 +25,36 @@ struct LocalView {
   std::span<const double> mu;
 
   LocalView() = default;
+  /// Throws Error (problem) if it has bilateral constraints.
   explicit LocalView(const LocalProblem& problem)
       : spacedim(problem.spacedim),
         W(problem.W),
         q(problem.q.data(), static_cast<std::size_t>(problem.q.size())),
-        mu(problem.mu.data(), static_cast<std::size_t>(problem.mu.size())) {}
+        mu(problem.mu.data(), static_cast<std::size_t>(problem.mu.size())) {
+    if (problem.s.size() > 0) {
+      throw Error(ErrorKind::problem, "are not part of this view", "bilateral constraints");
+    }
+  }
 };
 
-/// Runs one solve after another, in one thread. Nothing is allocated once it has seen the largest
-/// problem, except if the solver auto is needed.
+/// Runs one solve after another, in one thread. Nothing is allocated once it has seen the
+/// largest problem, except if the solver auto is needed.
 class Workspace {
  public:
   struct Settings {
     double tolerance = 1e-8;                                      ///< on Merit::error
     double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock of one solve [s]
+    std::function<bool()> poll;  ///< called about ten times a second; false stops the solve
   };
 
   /// The result. It belongs to the workspace until its next solve.
   struct Answer {
     Status status = Status::diverged;
     std::int64_t iterations = 0;
-    double error = 0;           ///< Merit::error
-    bool by_auto = false;       ///< whether the solver auto was needed
-    std::span<const double> r;  ///< (m)
-    std::span<const double> u;  ///< (m)
+    double error = 0;                 ///< Merit::error
+    const Result* by_auto = nullptr;  ///< what the solver auto found, if it was needed
+    std::span<const double> r;        ///< (m)
+    std::span<const double> u;        ///< (m)
   };
 
   /// `contacts` (nc, or empty) are names that contacts keep from one problem to the next. This
@@ -75,6 +83,7 @@ class Workspace {
 
   SmallSolver<2> plane_;
   SmallSolver<3> space_;
+  Result whole_;  // of the solver auto
   std::vector<double> r_, u_;
   std::vector<Real> real_, size_;
   // of the last solve

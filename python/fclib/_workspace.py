@@ -17,7 +17,7 @@ class Workspace:
 
     Local problems of Coulomb's law are solved without allocating memory, once the workspace has
     seen the largest of them. Problems of other formulations are solved by ``fclib.solve``, from the
-    same guesses. A workspace is for one thread.
+    same guesses. A workspace is for one thread. A copy has the settings, and no memory.
 
     >>> workspace = fclib.Workspace(tol=1e-8)
     >>> result = workspace.solve(problem, contacts=names)
@@ -30,8 +30,21 @@ class Workspace:
     def __init__(self, tol: float = 1e-8, *, time_limit: float | None = None) -> None:
         check_limits(tol, time_limit)
         self.tol = tol
-        self.time_limit = time_limit
+        self._time_limit = time_limit
         self._core = _core.Workspace()
+
+    @property
+    def time_limit(self) -> float | None:
+        """[s] of wall-clock time for each solve."""
+        return self._time_limit
+
+    @time_limit.setter
+    def time_limit(self, value: float | None) -> None:
+        check_limits(0, value)
+        self._time_limit = value
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _another, (self.tol, self.time_limit)
 
     def solve(self, problem: Problem, contacts: npt.ArrayLike | None = None) -> _core.Result:
         """Solve a problem, starting from the last reactions of its contacts.
@@ -45,7 +58,8 @@ class Workspace:
             As ``fclib.solve`` does; ``Result.solver`` is "workspace" if nothing else was needed.
 
         Raises:
-            ProblemError: the data of the problem is not valid, or there are not nc names.
+            ProblemError: the data of the problem is not valid, there are not nc names, or another
+                thread is in a solve.
         """
         check_problem(problem)
         names = None if contacts is None else _names(contacts, problem.nc)
@@ -69,6 +83,10 @@ class Workspace:
 
     def __repr__(self) -> str:
         return f"<Workspace: tol = {self.tol:g}>"
+
+
+def _another(tol: float, time_limit: float | None) -> Workspace:
+    return Workspace(tol, time_limit=time_limit)
 
 
 def _names(contacts: npt.ArrayLike, nc: int) -> Any:

@@ -82,6 +82,14 @@ int main(void) {
     CHECK(fabs(by_blocks[0] - 0.5) < 1e-12 && fabs(by_blocks[4] + 0.25) < 1e-12);
     batch.columns = NULL;
     CHECK(fclib_solve_batch(&batch) == 0 && strstr(fclib_last_error(), "batch->columns"));
+    { /* the second problem alone has a block */
+      const int sparse[4] = {0, 0, 0, 1};
+      batch.count = 2;
+      batch.nc_each = 1;
+      batch.starts = sparse;
+      CHECK(fclib_solve_batch(&batch) == 0 && strstr(fclib_last_error(), "batch->columns"));
+      batch.count = 1;
+    }
     batch.starts = NULL;
   }
   { /* a body of mass 1/2 on the ground: M v = H r + f, rows of the Jacobian are z, x, y */

@@ -77,9 +77,25 @@ int main(int argc, char** argv) {
   CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
   CHECK(strstr(fclib_last_error(), "W: "));
   i[2] = 2;
+  { /* more entries than there is room for, and half a contact */
+    struct fclib_matrix triplets = W;
+    triplets.nz = 3;
+    triplets.nzmax = 1;
+    triplets.p = W.i;
+    problem.W = &triplets;
+    CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
+    CHECK(strstr(fclib_last_error(), "nzmax"));
+    triplets.nzmax = 3;
+    triplets.m = triplets.n = W.m + 1;
+    CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
+    CHECK(strstr(fclib_last_error(), "spacedim"));
+    problem.W = &W;
+  }
   W.p = NULL;
   CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
   CHECK(!fclib_workspace_solve(NULL, &problem, NULL, 0, r, u, NULL, NULL));
+  fclib_workspace_forget(NULL);
+  CHECK(strstr(fclib_last_error(), "workspace"));
   fclib_workspace_forget(workspace);
   fclib_workspace_delete(workspace);
   fclib_workspace_delete(NULL);

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import signal
 import threading
 from pathlib import Path
 from typing import Any
@@ -539,3 +540,31 @@ def test_an_error_is_at_most_a_thousandth_of_the_tolerance_too_large() -> None:
         found = fclib.solve_batch(np.array([W]), np.array([q]), np.array([mu]), tol=tol)
         error = fclib.merit(problem, fclib.Solution(r=found.r[0])).error
         assert error <= found.error[0] <= error + 1e-3 * tol
+
+
+def test_a_batch_inside_a_batch_disturbs_none() -> None:
+    """A handler of a signal may solve another one; rolling problems are kept between solves."""
+    rng = np.random.default_rng(0)
+    H = rng.normal(size=(150, 300))
+    outer: dict[str, Any] = {"W": (H.T @ H)[None], "q": rng.normal(size=(1, 300)), "mu": 0.5}
+    outer |= {"mu_r": 0.1, "spacedim": 5, "tol": 1e-18, "time_limit": 1.0}
+    calls = []
+
+    def handler(*_: Any) -> None:
+        calls.append(
+            fclib.solve_batch(np.eye(5)[None], -np.ones((1, 5)), 0.5, mu_r=0.1, spacedim=5)
+        )
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.15)
+        found = fclib.solve_batch(**outer)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert calls
+    problem = fclib.LocalRollingProblem(
+        W=outer["W"][0], q=outer["q"][0], mu=[0.5] * 60, mu_r=[0.1] * 60, spacedim=5
+    )
+    error = fclib.merit(problem, fclib.Solution(r=found.r[0])).error
+    assert found.error[0] == pytest.approx(error, rel=1e-3, abs=1e-15)

@@ -1,7 +1,11 @@
 """One solve after another, from what contacts had before, in memory that is kept."""
 
+import copy
+import pickle
 import re
 import shutil
+import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +63,100 @@ def test_wrong_names_are_refused() -> None:
         workspace.solve(problem)
     with pytest.raises(fclib.OptionError):
         fclib.Workspace(tol=-1)
+
+
+def dense(nc: int) -> fclib.LocalProblem:
+    """Bodies with fewer coordinates than W has rows, all of them coupled."""
+    rng = np.random.default_rng(0)
+    H = rng.normal(size=(nc, 3 * nc))
+    return fclib.LocalProblem(W=H.T @ H, q=rng.normal(size=3 * nc), mu=rng.uniform(0.3, 1.5, nc))
+
+
+def test_a_limit_of_time_holds_before_auto_and_in_it() -> None:
+    """The method of small problems alone took tens of times as long."""
+    problem = dense(290)
+    workspace = fclib.Workspace(time_limit=0.05)
+    result = workspace.solve(problem)
+    assert result.status == "time_limit"
+    assert result.time < 2
+    assert result.error == pytest.approx(fclib.merit(problem, result.solution).error, rel=1e-6)
+    workspace.time_limit = None
+    assert workspace.solve(planted_local(nc=4, seed=0).problem).converged
+    with pytest.raises(fclib.OptionError, match="time_limit: -1"):
+        workspace.time_limit = -1
+
+
+def test_a_solve_can_be_interrupted() -> None:
+    class StopError(Exception):
+        pass
+
+    def stop(*_: Any) -> None:
+        raise StopError
+
+    workspace = fclib.Workspace(time_limit=60)
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        with pytest.raises(StopError):
+            workspace.solve(dense(420))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert workspace.solve(planted_local(nc=4, seed=0).problem).converged
+
+
+def test_what_auto_found_is_there_with_its_proof() -> None:
+    problem = fclib.LocalProblem(
+        W=np.zeros((6, 6)), q=[-1, 0.1, 0, -1, 0, 0.1], mu=[0.5, 0.5]
+    )  # fmt: skip
+    result = fclib.Workspace().solve(problem)
+    assert result.status == "infeasible"
+    assert result.certificate is not None
+    assert [stage.name for stage in result.stages]
+    assert result.solver == "auto"
+
+
+def test_without_names_it_starts_from_the_last_problem_of_as_many_contacts() -> None:
+    problem = planted_local(nc=20, seed=3).problem
+    workspace = fclib.Workspace()
+    workspace.solve(problem, np.arange(20))
+    assert workspace.solve(problem).iterations <= 2
+
+
+def test_a_copy_has_the_settings_and_no_memory() -> None:
+    workspace = fclib.Workspace(1e-6, time_limit=3)
+    problem = planted_local(nc=20, seed=3).problem
+    cold = workspace.solve(problem).iterations
+    for other in (copy.copy(workspace), copy.deepcopy(workspace), pickle.loads(
+        pickle.dumps(workspace)
+    )):  # fmt: skip
+        assert (other.tol, other.time_limit) == (1e-6, 3)
+        assert other.solve(problem).iterations == cold
+
+
+def test_threads_do_not_share_a_solve() -> None:
+    """Each answer is one of its own problem, or there is none."""
+    workspace = fclib.Workspace()
+    problems = [planted_local(nc=nc, seed=nc).problem for nc in (2, 7, 24, 40)]
+    wrong, refused = [], []
+
+    def work(problem: Any) -> None:
+        for _ in range(200):
+            try:
+                result = workspace.solve(problem)
+            except fclib.ProblemError as error:
+                refused.append(str(error))
+                continue
+            if result.converged and not fclib.merit(problem, result.solution).error <= 1e-8:
+                wrong.append(result)
+
+    threads = [threading.Thread(target=work, args=(problem,)) for problem in problems]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+    assert set(refused) <= {"workspace: is in use by another thread"}
 
 
 def test_from_c_nothing_is_allocated_step_by_step(tmp_path: Path) -> None:

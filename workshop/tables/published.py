@@ -228,7 +228,7 @@ def of_sets(
         own = one.every.at(one.tolerances[-1])
         if rows := beside_siconos(own):
             note = f"Each problem of {one.name} weighs the same; limit {own.instances[0].limit:g} s"
-            yield from (f"## How does the default solver compare with Siconos on {one.name}?", "")
+            yield from (f"## How does the default solver compare with Siconos on `{one.name}`?", "")
             yield from prose(BESIDE)
             yield from table(
                 f"published-{one.name}-siconos", rows, HINDSIGHT, f"{note}; {one.caption}."

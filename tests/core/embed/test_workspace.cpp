@@ -50,6 +50,12 @@ TEST(Workspace, StepsThirtyBodiesWithoutAllocation) {
   EXPECT_EQ(again, 0) << "it has seen the largest";
 }
 
+TEST(Workspace, JointsAreRefused) {
+  LocalProblem problem;
+  problem.s = Vector::Ones(1);
+  EXPECT_THROW(LocalView{problem}, Error);
+}
+
 /// A contact at rest on the ground, W = 1 / mass.
 struct OneContact {
   LocalProblem problem;

@@ -18,6 +18,7 @@ import fclib
 from fclib import bench
 from fclib.bench import calibration, generated, machine
 from fclib.bench.calibration import Calibration, calibration_in, ratio_of
+from fclib.bench.comparison import odds
 from fclib.bench.job import Job, Record
 
 pytest.importorskip("pyarrow")
@@ -310,6 +311,8 @@ def test_runs_of_a_larger_limit_count_on_the_board_and_smaller_ones_are_told(
     for row in rows:
         low, high = map(float, row["95 % interval"].split(" to "))
         assert low - 0.01 <= row["share"] <= high + 0.01
+        # one family, so all problems weigh the same
+        assert (low, high) == pytest.approx(odds(row["solved"], row["of"]), abs=0.006)
         assert row["machine"] == "fast"
 
 

@@ -65,13 +65,14 @@ def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[
             f"{name}: {one} is left out, with a limit of {short[one]:g} s or less: most solvers had"
             f" {max(numbers_in(runs, 'time_limit')):g} s"
         )
-    weights = costs.weights(WEIGH)
+    weights = {tol: costs.at(tol).weights(WEIGH) for tol in costs.tolerances}
     found = []
     for row in profiles.summary(costs, weigh=WEIGH):
         if row["solver"] == profiles.VIRTUAL_BEST:
             continue
         own = runs.where(solver == row["solver"])
-        worth = 1 / float((weights[:, costs.solvers.index(row["solver"])] ** 2).sum() or math.inf)
+        place = costs.solvers.index(row["solver"])
+        worth = 1 / float((weights[row["tol"]][:, place] ** 2).sum() or math.inf)
         share = min(1.0, row["share"])
         low, high = odds(share * worth, worth)
         found.append(

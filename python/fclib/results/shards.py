@@ -53,7 +53,16 @@ AHEAD: Final = 86400.0  # [s] by which a clock may be ahead
 # what makes two runs the same one, whatever their keys say
 RUN: Final = (
     *("hash", "tol", "merit", "start", "sequence", "step", "threads", "repeat", "copy"),
-    *("solver", "options", "version", "time_limit", "memory_limit", "node", "measured"),
+    *(
+        "solver",
+        "options",
+        "version",
+        "time_limit",
+        "wall_limit",
+        "memory_limit",
+        "node",
+        "measured",
+    ),
 )
 PART: Final = re.compile(rf"(.+)-([0-9a-f]{{{DIGITS}}})\.parquet")
 LEFT: Final = ("run", "campaign", "machine", "message")  # mean nothing elsewhere, or name paths

@@ -3,7 +3,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 
-#include <atomic>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -35,30 +34,6 @@ template <class Number>
 const Number* data_of(const Maybe<Number>& array) {
   return array ? array->data() : nullptr;
 }
-
-/// A workspace that threads cannot use at the same time: a solve lets go of the GIL.
-class SharedWorkspace {
- public:
-  class Use {
-   public:
-    explicit Use(SharedWorkspace& shared) : shared_(shared) {
-      if (shared_.busy_.test_and_set()) {
-        throw Error(ErrorKind::problem, "is in use by another thread", "workspace");
-      }
-    }
-    ~Use() { shared_.busy_.clear(); }
-    Use(const Use&) = delete;
-    Use& operator=(const Use&) = delete;
-    Workspace* operator->() const { return &shared_.core_; }
-
-   private:
-    SharedWorkspace& shared_;
-  };
-
- private:
-  Workspace core_;
-  std::atomic_flag busy_;
-};
 
 }  // namespace
 
@@ -188,17 +163,16 @@ void bind_embed(nb::module_& m) {
     return names ? std::span<const std::int64_t>(names->data(), names->size())
                  : std::span<const std::int64_t>();
   };
-  nb::class_<SharedWorkspace>(m, "Workspace", "The memory of fclib.Workspace.")
+  nb::class_<Workspace>(m, "Workspace", "The memory of fclib.Workspace.")
       .def(nb::init<>())
       .def(
           "solve",
-          [span_of](SharedWorkspace& shared, const LocalProblem& problem, const Names& contacts,
+          [span_of](Workspace& self, const LocalProblem& problem, const Names& contacts,
                     double tolerance, double time_limit) {
             Stopwatch watch;
             Result result;
-            const SharedWorkspace::Use self(shared);
             const Unlocked unlocked;
-            const auto answer = self->solve(
+            const auto answer = self.solve(
                 LocalView(problem), span_of(contacts),
                 {.tolerance = tolerance, .time_limit = time_limit, .poll = poll_signals});
             if (answer.by_auto != nullptr) result = *answer.by_auto;
@@ -219,19 +193,17 @@ void bind_embed(nb::module_& m) {
           "problem"_a, "contacts"_a.none(), "tolerance"_a, "time_limit"_a)
       .def(
           "guess",
-          [span_of](SharedWorkspace& shared, int spacedim, const Names& contacts,
-                    const Out<double>& r) {
-            SharedWorkspace::Use(shared)->guess(spacedim, span_of(contacts), {r.data(), r.size()});
+          [span_of](Workspace& self, int spacedim, const Names& contacts, const Out<double>& r) {
+            self.guess(spacedim, span_of(contacts), {r.data(), r.size()});
           },
           "spacedim"_a, "contacts"_a.none(), "r"_a)
       .def(
           "keep",
-          [span_of](SharedWorkspace& shared, int spacedim, const Names& contacts,
-                    const In<double>& r) {
-            SharedWorkspace::Use(shared)->keep(spacedim, span_of(contacts), {r.data(), r.size()});
+          [span_of](Workspace& self, int spacedim, const Names& contacts, const In<double>& r) {
+            self.keep(spacedim, span_of(contacts), {r.data(), r.size()});
           },
           "spacedim"_a, "contacts"_a.none(), "r"_a)
-      .def("forget", [](SharedWorkspace& shared) { SharedWorkspace::Use(shared)->forget(); });
+      .def("forget", &Workspace::forget);
   m.def(
       "status_names",
       [] {

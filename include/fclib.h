@@ -858,7 +858,7 @@ int fclib_workspace_solve(struct fclib_workspace* workspace, const struct fclib_
                           const size_t* contacts, double tolerance, double* r, double* u,
                           enum fclib_status* status, double* error);
 
-/** New. The next solve starts from zero again. The memory stays. */
+/** New. The next solve starts from zero again. The memory stays. NULL is an error. */
 void fclib_workspace_forget(struct fclib_workspace* workspace);
 
 #ifdef __cplusplus

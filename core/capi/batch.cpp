@@ -70,10 +70,11 @@ int solve(const fclib_batch* given_batch) {
       if (c.starts == nullptr) {
         need(c.W, "batch->W");
       } else if (c.count > 0) {
-        const auto* starts = c.starts;  // of each problem, or of the first one for all
+        constexpr std::ptrdiff_t most = 15000;  // contacts, as in core/embed/batch.cpp
+        const auto* starts = c.starts;          // of each problem, or of the first one for all
         for (std::int64_t k = 0; k < (c.one_pattern != 0 ? 1 : c.count); ++k) {
           const auto nc = static_cast<std::ptrdiff_t>(c.nc != nullptr ? c.nc[k] : c.nc_each);
-          if (nc < 0) break;
+          if (nc < 0 || nc > most) break;  // the solve refuses it
           if (starts[nc] > 0) {
             given(c.columns, "batch->columns");
             given(c.W, "batch->W");

@@ -182,6 +182,10 @@ Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& p
       return answer;
     }
     if (stops()) {
+      if (!std::isfinite(answer.error)) {
+        std::fill_n(r_.begin(), D * nc, 0.0);
+        answer.error = judge<D>(problem);
+      }
       answer.status = *ended;
       return answer;
     }

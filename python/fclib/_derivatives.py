@@ -351,8 +351,8 @@ class _Point:
     ) -> Array:
         """The rows dr_g + t dr_N + turn du_g / speed = 0, times K = (I + turn / (rho speed))^-1.
 
-        Returns K. With it no row grows without bound if the speed tends to 0; K du_g of the axes
-        that turn is then what is left.
+        Returns K. With it no row grows without bound if the speed tends to 0. On the axes that
+        turn, rho du_g = 0 is left then.
         """
         values, axes = np.linalg.eigh(turn)
         turns = values > TURNS * max(values.max(initial=0.0), 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ class Workspace:
         self.tol = tol
         self._time_limit = time_limit
         self._core = _core.Workspace()
+        self._lock = threading.Lock()
 
     @property
     def time_limit(self) -> float | None:
@@ -44,7 +46,7 @@ class Workspace:
         self._time_limit = value
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _another, (self.tol, self.time_limit)
+        return _another, (type(self), self.tol, self.time_limit)
 
     def solve(self, problem: Problem, contacts: npt.ArrayLike | None = None) -> _core.Result:
         """Solve a problem, starting from the last reactions of its contacts.
@@ -59,9 +61,17 @@ class Workspace:
 
         Raises:
             ProblemError: the data of the problem is not valid, there are not nc names, or another
-                thread is in a solve.
+                solve has not ended, as in another thread.
         """
         check_problem(problem)
+        if not self._lock.acquire(blocking=False):
+            raise _core.ProblemError("workspace: is in use: another solve has not ended")
+        try:
+            return self._solve(problem, contacts)
+        finally:
+            self._lock.release()
+
+    def _solve(self, problem: Problem, contacts: npt.ArrayLike | None) -> _core.Result:
         names = None if contacts is None else _names(contacts, problem.nc)
         limit = math.inf if self.time_limit is None else self.time_limit
         if type(problem) is _core.LocalProblem and problem.p == 0:
@@ -85,8 +95,8 @@ class Workspace:
         return f"<Workspace: tol = {self.tol:g}>"
 
 
-def _another(tol: float, time_limit: float | None) -> Workspace:
-    return Workspace(tol, time_limit=time_limit)
+def _another(kind: type[Workspace], tol: float, time_limit: float | None) -> Workspace:
+    return kind(tol, time_limit=time_limit)
 
 
 def _names(contacts: npt.ArrayLike, nc: int) -> Any:

@@ -68,7 +68,7 @@ class _Gradient(torch.autograd.Function):  # type: ignore[misc]
         found = _layer.backward(
             _array(W), _array(q), _array(mu), r, spacedim, _array(by_r), _array(by_u), threads
         )
-        return tuple(torch.from_numpy(one).to(q) for one in found)
+        return tuple(torch.from_numpy(one).to(x) for one, x in zip(found, (W, q, mu), strict=True))
 
     @staticmethod
     def backward(ctx: Any, *by: Any) -> NoReturn:
@@ -128,7 +128,8 @@ def _of_one_type(*given: Any) -> tuple[torch.Tensor, ...]:
     """Dense tensors of the common type of all, of floats."""
     tensors = []
     for name, one in zip(("W", "q", "mu"), given, strict=True):
-        tensor = torch.as_tensor(one)
+        # what is no tensor is copied: its owner may change it before the gradient is asked for
+        tensor = one if isinstance(one, torch.Tensor) else torch.tensor(one)
         if tensor.is_complex():
             _layer.refuse_complex(name)
         tensors.append(tensor if tensor.layout == torch.strided else tensor.to_dense())

@@ -557,7 +557,7 @@ def test_a_batch_inside_a_batch_disturbs_none() -> None:
 
     before = signal.signal(signal.SIGALRM, handler)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.15)
+        signal.setitimer(signal.ITIMER_REAL, 0.15, 0.15)
         found = fclib.solve_batch(**outer)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)

@@ -166,6 +166,16 @@ def test_torch_takes_what_becomes_a_tensor_and_gives_what_may_be_changed() -> No
     assert torch.isfinite(W.grad).all()
     with pytest.raises(fclib.ProblemError, match="W: has complex numbers"):
         fclib.torch.solve(1j * W, q, mu)
+    nothing = fclib.torch.solve(np.zeros((4, 0, 0)), np.zeros((4, 0)), np.zeros((4, 0)))
+    assert [one.shape for one in nothing] == [(4, 0), (4, 0)]
+    # an array may be changed before the gradient is asked for
+    array = np.eye(3)
+    sought = q.clone().requires_grad_()
+    u = fclib.torch.solve(array, sought, mu)[1]
+    array[:] = 0
+    (by,) = torch.autograd.grad(u.sum(), sought)
+    (own,) = torch.autograd.grad(fclib.torch.solve(np.eye(3), sought, mu)[1].sum(), sought)
+    torch.testing.assert_close(by, own)
     with pytest.raises(fclib.ProblemError, match=r"mu: has the shape \(\)"):
         fclib.torch.solve(W, q, 0.5)
 
@@ -252,6 +262,8 @@ def test_jax_tells_that_a_problem_is_not_solved() -> None:
         jax.jit(lambda tol: fclib.jax.solve(W, q, mu, tol=tol))(1e-8)
     with pytest.raises(fclib.ProblemError, match="q: has complex numbers"):
         fclib.jax.solve(W, 1j * q, mu)
+    nothing = fclib.jax.solve(np.zeros((4, 0, 0)), np.zeros((4, 0)), np.zeros((4, 0)))
+    assert [one.shape for one in nothing] == [(4, 0), (4, 0)]
     assert fclib.jax.solve(2 * np.eye(3, dtype=int), [-3, 1, 0], [1])[0].tolist() == [1.5, -0.5, 0]
 
 

@@ -236,6 +236,7 @@ def changed(part: Path, to: Path, changes: dict[str, Any], row: int = 0) -> Path
         ({"solved": 2}, "solved is 2"),
         ({"merit": "foo"}, "merit is 'foo'"),
         ({"start": "hot"}, "start is 'hot'"),
+        ({"status": "foo", "solved": 0}, "status is 'foo'"),
         ({"time_limit": None}, "has no time_limit"),
         ({"time_limit": math.inf}, "time_limit is inf"),
         ({"wall_limit": -1.0}, "wall_limit is -1.0"),
@@ -279,12 +280,24 @@ def test_machines_of_one_processor_stay_apart(tmp_path: Path) -> None:
     assert part is not None
     assert results.verify(part) == []
     (found,) = results.shards(tmp_path / "parts")
-    names = {"some processor (1)", "some processor (2)"}
+    names = {"some processor", "some processor (2)"}
     assert found.machines.keys() == names
     assert {row["node"] for row in results.rows_of(part)} == names
     with results.alone([part]) as joined, bench.Store(joined.path) as opened:
         cpu = {row["solver"]: row["cpu_s"] for row in opened.table()}
     assert max(cpu.values()) / min(cpu.values()) == pytest.approx(3.0)
+    # what is published is not published again if another machine joins
+    first = store(tmp_path / "grows.sqlite", facts("one", 1.0), ["nsgs"])
+    parts = tmp_path / "grown"
+    with bench.Store(first) as opened:
+        assert results.pack(opened, parts, "small") is not None
+    store(first, facts("two", 3.0), ["apgd"])
+    with bench.Store(first) as opened:
+        more = results.pack(opened, parts, "small", there=results.shards(parts))
+    assert more is not None
+    assert {(row["solver"], row["node"]) for row in results.rows_of(more)} == {
+        ("apgd", "some processor (2)")
+    }
 
 
 def test_runs_of_a_larger_limit_count_on_the_board_and_smaller_ones_are_told(
@@ -307,7 +320,7 @@ def test_runs_of_a_larger_limit_count_on_the_board_and_smaller_ones_are_told(
     rows = results.leaders(results.shards(parts), told.append)
     solved = {(row["solver"], row["solved"]) for row in rows}
     assert solved == {("nsgs", 4), ("apgd", 4), ("bb", 3), ("bb", 4)}
-    assert told == ["small: admm is left out, with a limit of 5 s or less: most solvers had 10 s"]
+    assert told == ["small: admm is left out: it had 5 s or less, and most solvers 10 s"]
     for row in rows:
         low, high = map(float, row["95 % interval"].split(" to "))
         assert low - 0.01 <= row["share"] <= high + 0.01
@@ -572,6 +585,14 @@ def test_published_runs_count_under_a_smaller_limit(tmp_path: Path) -> None:
         rows = [row for row in opened.table() if row["solver"] != "ppa-nsn"]
     assert {(row["status"], row["time_limit"]) for row in rows} == {("time_limit", 1.0)}
     assert len(rows) == 16
+    # what I have run myself is not taken from others
+    again = {**plan, "solvers": ["nsgs", "ppa-nsn"]}
+    with bench.Store(tmp_path / "both.sqlite") as opened:
+        opened.add_all([(job, own) for job in bench.Campaign.of(again).plan()])
+    with results.beside(tmp_path / "both.sqlite", [part]) as found:
+        with bench.Store(found.path) as opened:
+            cpu = {row["cpu_s"] for row in opened.table() if row["solver"] == "nsgs"}
+        assert cpu == {0.1}
     # mine is 100 s: 10 s count for all, and mine took longer on one problem
     larger = {**plan, "time_limit": 100.0}
     slow = replace(own, cpu_s=50.0)

@@ -243,12 +243,13 @@ def submit(
         with bench.Store(store, create=False) as opened:
             own = {float(row["time_limit"]) for row in opened.table()}
             published = results.shards(found) if (found := results.folder()) else []
+            usual = boards.usual_limit(name, published)
             path = results.submit(opened, where, name, machine, published)
     except (ImportError, fclib.Error) as error:
         fail(str(error))
     except OSError as error:
         fail(words_of(error))
-    if own and published and (usual := boards.usual_limit(name, published)) > max(own):
+    if own and usual > max(own):
         tell(
             f"the limit of these runs is {max(own):g} s. The leaderboard of {name} compares under"
             f" {usual:g} s, and leaves them out: run them with --time-limit {usual:g}"

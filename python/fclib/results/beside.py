@@ -55,7 +55,8 @@ def beside(
     under one limit: that of the store, or that of most published solvers if it is smaller. A run
     that takes longer has failed, and a published one with a smaller limit is left out. A time on
     another machine becomes the time on this one: it is multiplied by the ratio of the two
-    calibrations. `replaced` versions are left out.
+    calibrations. `replaced` versions are left out, and
+    so are the published runs of what the store has run itself.
 
     Args:
         mine: the store.
@@ -79,7 +80,7 @@ def beside(
             looked = [look(part) for part in parts]
             machines = Machines(looked)
 
-            theirs = usual_limits(row for row in _keys_of(looked) if kind_of(row) in limits)
+            theirs = usual_limits(row for row in keys_of(looked) if kind_of(row) in limits)
             lower = {
                 kind: (theirs[kind], wall)
                 for kind, (limit, wall) in limits.items()
@@ -95,13 +96,18 @@ def beside(
                 }
             )  # fmt: skip
 
+            mine_too = {
+                (kind_of(row), version_of(row)) for row in joined.table() if row["node"] == node
+            }
+
             def counts(row: Mapping[str, Any]) -> bool:
-                return bool(row["time_limit"] >= limits.get(kind_of(row), NONE)[0])
+                long = row["time_limit"] >= limits.get(kind_of(row), NONE)[0]
+                return bool(long) and (kind_of(row), version_of(row)) not in mine_too
 
             # all of them are compared under one limit
             older = replaced(
                 row | {"time_limit": limits[kind_of(row)][0]}
-                for row in _keys_of(looked)
+                for row in keys_of(looked)
                 if counts(row)
             )
             for part in looked:
@@ -148,20 +154,20 @@ def alone(parts: Iterable[Path], digests: Container[str] | None = None) -> Itera
     def counts_here(row: Mapping[str, Any]) -> bool:
         return digests is None or row["hash"] in digests
 
-    limits = usual_limits(filter(counts_here, _keys_of(found)))
+    limits = usual_limits(filter(counts_here, keys_of(found)))
     walls: dict[tuple[Any, ...], float] = defaultdict(float)
     short: dict[str, float] = defaultdict(float)
 
     def fits(row: Mapping[str, Any]) -> bool:
         return counts_here(row) and row["time_limit"] >= limits[kind_of(row)]
 
-    for row in filter(counts_here, _keys_of(found)):
+    for row in filter(counts_here, keys_of(found)):
         if fits(row):
             walls[kind_of(row)] = max(walls[kind_of(row)], row["wall_limit"] or 0.0)
         else:
             short[row["solver"]] = max(short[row["solver"]], row["time_limit"])
     older = replaced(
-        row | {"time_limit": limits[kind_of(row)]} for row in _keys_of(found) if fits(row)
+        row | {"time_limit": limits[kind_of(row)]} for row in keys_of(found) if fits(row)
     )
     with TemporaryDirectory(prefix="fclib-results-") as temporary:
         path = Path(temporary) / "published.sqlite"
@@ -285,7 +291,7 @@ def replaced(rows: Iterable[Mapping[str, Any]]) -> set[tuple[Any, ...]]:
     }
 
 
-def _keys_of(parts: Iterable[Shard]) -> Iterator[dict[str, Any]]:
+def keys_of(parts: Iterable[Shard]) -> Iterator[dict[str, Any]]:
     """What `replaced` reads of the runs of parts."""
     names = (*KIND, *VERSION, "time_limit", "wall_limit", "started")
     return (row for part in parts for row in rows_of(part.path, names))

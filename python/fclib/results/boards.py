@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from fclib.collections import set_index
+from fclib.results.beside import keys_of, usual_limits
 from fclib.results.shards import Shard, ShardError, look, rows_of
 
 # sets that were chosen from runs, and the parts that have these, beside parts of their own name
@@ -71,7 +72,8 @@ def of_sets(paths: Iterable[Path], names: Sequence[str]) -> tuple[list[Path], se
 
 
 def usual_limit(name: str, parts: Iterable[Shard]) -> float:
-    """The limit of CPU time [s] that most runs of a set have; 0 without runs."""
+    """The limit of CPU time [s] under which most problems of a set are compared; 0 without runs."""
     own = sources(by_name(parts)).get(name, ())
-    limits = Counter(row["time_limit"] for one in own for row in rows_of(one.path, ("time_limit",)))
+    digests = digests_of(name, own)
+    limits = Counter(usual_limits(row for row in keys_of(own) if row["hash"] in digests).values())
     return max(limits, key=lambda limit: limits[limit], default=0.0)

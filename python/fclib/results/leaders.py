@@ -7,7 +7,6 @@ machines are brought to the scale of one by their calibrations.
 
 from __future__ import annotations
 
-import math
 import time
 from collections import defaultdict
 from collections.abc import Callable, Container, Sequence
@@ -58,13 +57,15 @@ def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[
     costs = comparison.compared(profiles.gather(runs))
     solver, started = words_in(runs, "solver"), numbers_in(runs, "started")
     labels = {found: named(found, measured) for found in map(str, solver.present())}
-    for one in sorted(short.keys() - set(labels.values())):
+    compared = {labels[one] for one in costs.solvers}
+    for one in sorted((short.keys() | set(labels.values())) - compared):
         if tell is None:
             break
-        tell(
-            f"{name}: {one} is left out, with a limit of {short[one]:g} s or less: most solvers had"
-            f" {max(numbers_in(runs, 'time_limit')):g} s"
-        )
+        why = "has run too few of its problems"
+        if one in short:
+            most = max(numbers_in(runs, "time_limit"))
+            why = f"had {short[one]:g} s or less, and most solvers {most:g} s"
+        tell(f"{name}: {one} is left out: it {why}")
     weights = {tol: costs.at(tol).weights(WEIGH) for tol in costs.tolerances}
     found = []
     for row in profiles.summary(costs, weigh=WEIGH):
@@ -72,7 +73,7 @@ def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[
             continue
         own = runs.where(solver == row["solver"])
         place = costs.solvers.index(row["solver"])
-        worth = 1 / float((weights[row["tol"]][:, place] ** 2).sum() or math.inf)
+        worth = 1 / float((weights[row["tol"]][:, place] ** 2).sum())
         share = min(1.0, row["share"])
         low, high = odds(share * worth, worth)
         found.append(

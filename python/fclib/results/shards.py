@@ -15,7 +15,7 @@ import math
 import re
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -26,6 +26,7 @@ from fclib import _core
 from fclib._files import write_bytes
 from fclib._regular import reason_of, regular
 from fclib._verdicts import is_solved
+from fclib.bench.job import STATUSES
 from fclib.bench.layout import CAMPAIGN, HISTORY, columns
 from fclib.bench.store import LONG, Store
 from fclib.bench.table import TEXTS, WHOLE
@@ -246,7 +247,7 @@ def pack(
 def names_of(machines: Mapping[str, Mapping[str, Any]], name: str = "") -> dict[str, str]:
     """The name under which each machine is published: the model of its processor.
 
-    Several machines of one model have numbers. One that was calibrated later is the same machine.
+    Further machines of one model have numbers. One that was calibrated later is the same machine.
     """
     if name:
         return dict.fromkeys(machines, name)
@@ -260,7 +261,7 @@ def names_of(machines: Mapping[str, Mapping[str, Any]], name: str = "") -> dict[
         model = str(facts.get("cpu") or "?")
         own = nodes[model]
         number = own.index(str(facts.get("node"))) + 1
-        found[key] = model if len(own) == 1 else f"{model} ({number})"
+        found[key] = model if number == 1 else f"{model} ({number})"
     return found
 
 
@@ -355,11 +356,16 @@ def twice(paths: Iterable[Path]) -> list[str]:
     first: dict[tuple[Any, ...], Path] = {}
     wrong = []
     for path in paths:
-        for row in rows_of(path, ("key", "node")):
-            key = row["key"], row["node"]
-            other = first.setdefault(key, path)
+        # a processor is the name of a machine: another one has other times for the calibration
+        calibrations = {
+            node: json.dumps(facts.get("calibration"), sort_keys=True)
+            for node, facts in look(path).machines.items()
+        }
+        for row in rows_of(path, ("key", *RUN)):
+            run = *(row[name] for name in RUN), calibrations.get(row["node"])
+            other = first.setdefault(run, path)
             if other != path:
-                wrong.append(f"{path}: the run {key[0]} is in {other.name} too")
+                wrong.append(f"{path}: the run {row['key']} is in {other.name} too")
     return wrong
 
 
@@ -375,7 +381,10 @@ def contradictions(row: Mapping[str, Any]) -> list[str]:
     if wrong:
         return wrong
     error, tol, limit = error_of(row), row["tol"], row["time_limit"]
-    for name, known in (("merit", MERITS), ("start", STARTS), ("solved", (0, 1))):
+    known: Collection[Any]
+    for name, known in (
+        *(("merit", MERITS), ("start", STARTS), ("status", STATUSES), ("solved", (0, 1))),
+    ):
         if row[name] not in known:
             wrong.append(f"{name} is {row[name]!r}, which is none of {', '.join(map(str, known))}")
     for name in ("tol", "time_limit", "wall_limit"):

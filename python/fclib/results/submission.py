@@ -46,7 +46,8 @@ def submit(
     if any(calibration_in(facts) is None for facts in store.machines().values()):
         raise ShardError(
             f"{store.path}: has runs of a machine that was not calibrated before, which do not"
-            " compare with those of others: `fclib bench --calibrate`, and then run it anew"
+            " compare with those of others: `fclib bench --calibrate`, and then run it anew, into"
+            " another store"
         )
     count = len(store.with_solutions())
     if count < ENOUGH:
@@ -54,11 +55,13 @@ def submit(
             f"{store.path}: has {counted(count, 'solution')}, and {ENOUGH} are asked for: a"
             " campaign with `repeated` below 1 keeps those of the problems that it repeats"
         )
+    before = set(where.glob("*"))
     path = pack(store, where, name, machine, there, solutions=True)
     if path is None:
         raise ShardError(f"{store.path}: has no run that is not published yet")
     if wrong := verify(path):
-        path.unlink()
+        if path not in before:
+            path.unlink()
         raise ShardError(f"{store.path}: {wrong[0]}")
     return path
 

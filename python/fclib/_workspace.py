@@ -64,12 +64,16 @@ class Workspace:
                 solve has not ended, as in another thread.
         """
         check_problem(problem)
-        if not self._lock.acquire(blocking=False):
-            raise _core.ProblemError("workspace: is in use: another solve has not ended")
+        self._begin()
         try:
             return self._solve(problem, contacts)
         finally:
             self._lock.release()
+
+    def _begin(self) -> None:
+        """Take the lock. A solve lets go of the GIL, and handlers of signals may come in it."""
+        if not self._lock.acquire(blocking=False):
+            raise _core.ProblemError("workspace: is in use: another solve has not ended")
 
     def _solve(self, problem: Problem, contacts: npt.ArrayLike | None) -> _core.Result:
         names = None if contacts is None else _names(contacts, problem.nc)
@@ -88,8 +92,12 @@ class Workspace:
         return result
 
     def forget(self) -> None:
-        """Start from zero again; the memory stays."""
-        self._core.forget()
+        """Start from zero again; the memory stays. ProblemError if a solve has not ended."""
+        self._begin()
+        try:
+            self._core.forget()
+        finally:
+            self._lock.release()
 
     def __repr__(self) -> str:
         return f"<Workspace: tol = {self.tol:g}>"

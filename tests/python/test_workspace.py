@@ -149,6 +149,9 @@ def test_a_solve_before_another_has_ended_is_refused() -> None:
         with pytest.raises(fclib.ProblemError) as error:
             workspace.solve(small)
         said.append(str(error.value))
+        with pytest.raises(fclib.ProblemError) as error:
+            workspace.forget()
+        said.append(str(error.value))
 
     before = signal.signal(signal.SIGALRM, handler)
     try:

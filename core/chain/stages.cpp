@@ -43,7 +43,8 @@ constexpr double instead_of_factors = 100;  // cost of steps [factorisations] wi
 // Gauss-Seidel
 constexpr std::int64_t sweeps_per_look = 5;  // sweeps between two looks at the error
 constexpr Index few_contacts = 10;           // so few are looked at after 1, 3 and 5 sweeps
-constexpr double extension = 20;             // the sweeps go on if at most so many limits are left
+constexpr double extension = 20;  // an end is in sight if at most so many limits are left
+constexpr double hope = 2;        // sweeps go on to so many times those as an end was in sight
 
 // sweeps and gradients that go on
 constexpr std::int64_t steps_per_look = 10;  // steps between two looks at the error
@@ -289,14 +290,17 @@ template <class Cone>
 void Island<Cone>::run(const GaussSeidelStage& rules) {
   const std::int64_t interval = sweeps_per_look;
   const double worth = rules.worth * std::max(1.0, -std::log10(tolerance_));
-  std::int64_t limit = rules.limit;
-  double last = error_;
+  const bool asks = rules.left > 0 || rules.worth > 0;
+  std::vector<std::pair<std::int64_t, double>> looks;  // sweeps, and the error after them
+  std::size_t middle = 0;                              // the last look of the first half
+  std::int64_t in_sight = 0;                           // sweeps as an end was in sight
   std::int64_t k = 0;
-  while (k < limit) {
+  while (asks || k < rules.limit) {
     // one sweep solves some problems; a few sweeps solve some with few contacts
     const bool few = problem_.nc() <= few_contacts;
     const std::int64_t wanted = k == 0 ? 1 : k < interval ? (few ? k + 1 : interval - 1) : interval;
-    const std::int64_t count = std::min({wanted, limit - k, tracker_.left()});
+    std::int64_t count = std::min(wanted, tracker_.left());
+    if (!asks) count = std::min(count, rules.limit - k);
     for (std::int64_t j = 0; j < count; ++j) gauss_seidel_->sweep(r_, u_);
     k += count;
     double error = relative_error<Cone>(problem_, u_, r_);
@@ -308,15 +312,21 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
       if (!std::isfinite(error)) return_to_best();
       return;
     }
-    if ((rules.left > 0 || rules.worth > 0) && k >= 2 * interval && k >= limit / 4) {
-      const double rate = std::log(last / error) / static_cast<double>(count);
-      const double left = std::log(error / tolerance_) / rate;
-      if (!(rate > 0)) return;
-      if (rules.left > 0 && left > static_cast<double>(rules.left)) return;
-      if (rules.worth > 0 && !pays(left * sweep_cost(problem_), worth)) return;
-      if (k == limit && left < extension * static_cast<double>(limit)) limit += interval;
+    looks.emplace_back(k, error);
+    if (!asks || k < 2 * interval || k < rules.limit / 4) continue;
+    // the error of single sweeps goes up and down
+    while (2 * looks[middle + 1].first <= k) ++middle;
+    const auto [before, error_before] = looks[middle];
+    const double rate = std::log(error_before / error) / static_cast<double>(k - before);
+    const double left = std::log(error / tolerance_) / rate;
+    const double most = rules.left > 0 ? static_cast<double>(rules.left)
+                                       : extension * static_cast<double>(rules.limit);
+    if (rate > 0 && left <= most &&
+        (rules.worth == 0 || pays(left * sweep_cost(problem_), worth))) {
+      in_sight = k;
+    } else if (static_cast<double>(k) >= hope * static_cast<double>(in_sight)) {
+      return;
     }
-    last = error;
   }
 }
 

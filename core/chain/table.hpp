@@ -116,8 +116,11 @@ struct GaussSeidelStage {
   static constexpr auto fields() {
     using O = GaussSeidelStage;
     return std::tuple{
-        option("limit", &O::limit, "sweeps", {1, 1e9},
-               "The largest number of sweeps. There are more if they converge soon."),
+        option(
+            "limit", &O::limit, "sweeps", {1, 1e9},
+            "The largest number of sweeps. With left or worth, the sweeps go on instead while an "
+            "end is in sight: at the rate of their second half, at most 20 times this number "
+            "are left. They end if none was in sight for half of them."),
         option("left", &O::left, "sweeps", {0, 1e9},
                "The largest number of sweeps that may be left, at their rate. 0: any number."),
         option("worth", &O::worth, "factorisations a digit", {0},

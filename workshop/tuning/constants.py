@@ -109,6 +109,7 @@ CONSTANTS = [
     Constant("most_parts", "proof/no_solution.cpp", ("8", "0", "1", "1000"), "linked"),
     Constant("instead_of_factors", "chain/stages.cpp", ("100", "10", "1000"), "no memory"),
     Constant("time_of_multiplication", "chain/stages.cpp", ("0.25", "0.1", "0.5", "1"), "loose"),
+    Constant("hope", "chain/stages.cpp", ("2", "1", "1.5", "3"), "loose"),
     *(
         varied(name, "jammed")
         for name in (

@@ -730,8 +730,8 @@ int fclib_sequence_add_global_spin(struct fclib_sequence* sequence,
 int fclib_sequence_add_local_spin(struct fclib_sequence* sequence,
                                   const struct fclib_local_spin* problem, int world);
 
-/** New. Add to the step. A solution and guesses need r, and l if p > 0; v and u may be NULL. Return
- *  1, or 0. */
+/** New. Add to the step. If the call that was to add its problem failed, there is none. A solution
+ *  and guesses need r, and l if p > 0; v and u may be NULL. Return 1, or 0. */
 int fclib_sequence_add_solution(struct fclib_sequence* sequence,
                                 const struct fclib_solution* solution);
 int fclib_sequence_add_guesses(struct fclib_sequence* sequence, int number_of_guesses,

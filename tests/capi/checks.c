@@ -371,6 +371,19 @@ static void sequence(void) {
   g.nc = 1;
   CHECK(fclib_sequence_add_geometry(written, &g));
   CHECK(fclib_sequence_size(path_of("sequence")) <= 1);
+
+  /* what belongs to a refused problem does not go into the step before */
+  struct fclib_local bad = a;
+  bad.q = NULL;
+  for (int wrong = 0; wrong < 2; ++wrong) {
+    CHECK(!fclib_sequence_add_local(written, wrong ? &a : &bad, wrong ? -1 : 0));
+    CHECK(!fclib_sequence_add_solution(written, &s));
+    SAYS("sequence: has no step to add to: the call that was to add its problem failed");
+    CHECK(!fclib_sequence_add_guesses(written, 2, more));
+    SAYS("has no step to add to");
+    CHECK(!fclib_sequence_add_geometry(written, &g));
+    SAYS("has no step to add to");
+  }
   CHECK(fclib_sequence_flush(written));
   CHECK(fclib_sequence_size(path_of("sequence")) == 2);
   CHECK(!fclib_sequence_add_local(written, NULL, 0) && !fclib_sequence_add_local(NULL, &a, 0));
@@ -391,6 +404,7 @@ static void sequence(void) {
   int count = 0;
   found = fclib_read_guesses(step, &count);
   CHECK(found && count == 2 && found[1].r[0] == 0.5 && found[1].v);
+  CHECK(!fclib_read_solution(step));
   fclib_delete_solutions(found, 2);
 
   written = fclib_sequence_continue(path_of("sequence"));

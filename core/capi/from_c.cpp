@@ -30,11 +30,7 @@ RawMatrixView view_of(const fclib_matrix& c, const Place& where) {
   std::size_t entries = size_of(c.nzmax, where / "nzmax");
   if (c.nz >= 0) {
     a.storage = Storage::triplet;
-    // programs for libfclib 3.1 may leave nzmax at 0
-    if (c.nzmax > 0 && c.nz > c.nzmax) {
-      fail(where / "nz",
-           std::to_string(c.nz) + " entries, more than nzmax, " + std::to_string(c.nzmax));
-    }
+    require_nzmax(c, where / "nz");
     entries = static_cast<std::size_t>(c.nz);
     a.p = numbers(c.p, entries, where / "p");
   } else if (c.nz == nz_csc || c.nz == nz_csr) {
@@ -114,6 +110,11 @@ ProblemInfo info_of(const C& c) {
 std::size_t size_of(int count, const Place& where) {
   if (count < 0) fail(where, "is " + std::to_string(count) + ", but must not be negative");
   return static_cast<std::size_t>(count);
+}
+
+void require_nzmax(const fclib_matrix& c, const Place& where) {
+  if (c.nzmax == 0 || c.nz <= c.nzmax) return;
+  fail(where, std::to_string(c.nz) + " entries, more than nzmax, " + std::to_string(c.nzmax));
 }
 
 Vector vector(const double* values, Index size, const Place& where) {

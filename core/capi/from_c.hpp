@@ -10,6 +10,9 @@ namespace fclib::c {
 
 std::size_t size_of(int count, const Place& where);
 
+/// Throws if triplets are more than nzmax, which programs for libfclib 3.1 may leave at 0.
+void require_nzmax(const fclib_matrix& c, const Place& where);
+
 Vector vector(const double* values, Index size, const Place& where);
 
 /// The problem as it is. Only what its own sizes need is checked.

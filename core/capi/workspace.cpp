@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capi/errors.hpp"
+#include "capi/from_c.hpp"
 #include "capi/status.hpp"
 #include "linalg/places.hpp"
 
@@ -37,11 +38,11 @@ MatrixView view_of(const fclib_matrix& c) {
   } else {
     view.storage = c.nz == -1 ? Storage::csc : c.nz == -2 ? Storage::csr : Storage::triplet;
     if (c.nz < -3) fail("problem->W->nz", "is no storage");
+    if (c.nz >= 0) require_nzmax(c, "problem->W->nz");
     if (c.nz >= 0 ? c.nz > 0 : view.rows > 0) view.p = need(c.p, "problem->W->p");
     view.nnz = c.nz >= 0           ? c.nz
                : view.p != nullptr ? view.p[view.storage == Storage::csc ? view.cols : view.rows]
                                    : 0;
-    if (view.nnz > c.nzmax && c.nz >= 0) fail("problem->W->nz", "is more than nzmax");
     if (c.nz < 0 && view.nnz > c.nzmax) fail("problem->W->nzmax", "is less than the pointers say");
     if (c.nz < 0 && view.nnz == 0 && c.nzmax > 1 && c.x != nullptr) {
       require_counted({c.x, static_cast<std::size_t>(c.nzmax)}, 0, "problem->W->p");

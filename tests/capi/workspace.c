@@ -85,6 +85,10 @@ int main(int argc, char** argv) {
     problem.W = &triplets;
     CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
     CHECK(strstr(fclib_last_error(), "nzmax"));
+    triplets.nzmax = 0; /* as programs for libfclib 3.1 may leave it */
+    CHECK(fclib_validate_local(&problem));
+    CHECK(fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, &status, &error));
+    CHECK(status == FCLIB_CONVERGED && error <= 1e-8);
     triplets.nzmax = 3;
     triplets.m = triplets.n = W.m + 1;
     CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));

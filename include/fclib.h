@@ -319,6 +319,10 @@ const char* fclib_version(void);
  *  library, and stays until the next call of this thread. */
 const char* fclib_last_error(void);
 
+/** New. Makes a message that of the last call of this thread, and calls the handler with it. For
+ *  layers over this library, which check more, such as the Fortran module. */
+void fclib_set_error(const char* message);
+
 /** New. A function that gets every failure, in the thread in which it happens. It must return, and
  *  may call fclib. */
 typedef void (*fclib_error_handler)(const char* message, void* context);

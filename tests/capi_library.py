@@ -48,7 +48,7 @@ def compiler(language: str) -> str:
     return found
 
 
-def compile_fortran(source: Path, program: Path) -> Path:
+def compile_fortran(source: Path, program: Path, *flags: str) -> Path:
     """Link a Fortran program to our library, its module compiled beside it."""
     compiler = shutil.which("gfortran")
     if compiler is None:
@@ -65,6 +65,7 @@ def compile_fortran(source: Path, program: Path) -> Path:
                 *warnings,
                 "-g",
                 "-fcheck=all",
+                *flags,
                 "-J",
                 str(program.parent),
                 str(module),

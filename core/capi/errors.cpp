@@ -59,6 +59,10 @@ extern "C" {
 
 const char* fclib_last_error(void) { return last_error.c_str(); }
 
+void fclib_set_error(const char* message) {
+  report(message != nullptr ? message : "message: is NULL");
+}
+
 void fclib_set_error_handler(fclib_error_handler function, void* context) {
   const std::lock_guard lock(handler_mutex);
   handler = {function, context};

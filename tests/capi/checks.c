@@ -64,6 +64,12 @@ static void errors(void) {
   SAYS("is no storage");
   CHECK(!fclib_read_local(path_of("a")));
 
+  /* a layer over the library adds messages of its own */
+  fclib_set_error("mine");
+  CHECK(!strcmp(fclib_last_error(), "mine"));
+  fclib_set_error(NULL);
+  SAYS("is NULL");
+
   /* a success clears the message */
   a = local();
   CHECK(fclib_write_local(&a, path_of("a")));

@@ -34,6 +34,7 @@ program checks
   call bodies
   call steps
   call failures
+  call lengths
   call check(fclib_solver(1) /= "", "there is a solver")
   call check(fclib_solver(1000) == "" .and. fclib_solver(0) == "", "and not any number of them")
   call check(fclib_status_text(FCLIB_INACCURATE) == "inaccurate", "statuses have names")
@@ -407,6 +408,58 @@ contains
     call check(fclib_set_compression(10) == 0 .and. fclib_set_compression(4) == 1, "levels")
     call check(told == 9, "the handler hears of each")
     call fclib_set_error_handler(c_null_funptr, c_null_ptr)
+  end subroutine
+
+  ! arrays whose lengths do not fit
+
+  subroutine lengths
+    type(fclib_local) :: problem
+    type(fclib_solution) :: solution
+    real(dp) :: x(3) = 1, y(3) = -1, bound
+    integer :: one(3) = [1, 2, 3]
+    logical :: ok
+    call falling(problem)
+    call fclib_allocate(solution, problem)
+
+    call fclib_set_triplets(problem%W, 3, 3, one(:2), one, x, ok)
+    call check(.not. ok, "too few rows")
+    call says("fclib_set_triplets: i has 2 entries, expected 3")
+    call check(.not. fclib_validate(problem), "no call takes the matrix")
+    call says("/fclib_local/W/nz: -4 is no storage")
+    call check(.not. fclib_solve(problem, "nsgs", solution), "nor a solve")
+    call fclib_set_triplets(problem%W, 3, 3, one, one(:1), x)
+    call says("fclib_set_triplets: j has 1 entries, expected 3")
+    call fclib_set_columns(problem%W, 3, 3, one, one, x)
+    call says("fclib_set_columns: starts has 3 entries, expected 4")
+    call fclib_set_columns(problem%W, 3, 3, [one, 4], one(:2), x)
+    call says("fclib_set_columns: i has 2 entries, expected 3")
+    call fclib_set_rows(problem%W, 3, 3, [one, 4, 4], one, x)
+    call says("fclib_set_rows: starts has 5 entries, expected 4")
+    call fclib_set_rows(problem%W, 3, 3, [one, 4], one, x(:2))
+    call says("fclib_set_rows: j has 3 entries, expected 2")
+    call fclib_set_rows(problem%W, 3, 3, [one, 4], one, x, ok)
+    call check(ok .and. fclib_validate(problem), "lengths that fit")
+
+    call check(.not. fclib_solve(problem, "auto", solution, certificate_y=y), "y is too long")
+    call says("fclib_solve: certificate_y has 3 entries, expected 1")
+    call check(.not. fclib_solve(problem, "auto", solution, certificate_y=y(:0)), "and too short")
+    call check(.not. fclib_solve(problem, "auto", solution, certificate_y=y(:1), certificate_z=y), &
+               "z is too long")
+    call says("fclib_solve: certificate_z has 3 entries, expected 0")
+    call check(all(y == -1._dp), "nothing is written")
+    bound = fclib_certificate(problem, y(:0))
+    call check(bound /= bound, "nothing is proven by too few numbers")
+    call says("fclib_certificate: y has 0 entries, expected 1")
+    bound = fclib_certificate(problem, y(:1), y)
+    call check(bound /= bound, "nor by too many")
+    call says("fclib_certificate: z has 3 entries, expected 0")
+    call fclib_delete(solution)
+    call fclib_delete(problem)
+  end subroutine
+
+  subroutine says(message)
+    character(*), intent(in) :: message
+    call check(fclib_error() == message, message)
   end subroutine
 
 end program

@@ -321,6 +321,14 @@ def test_what_the_fortran_module_promises(fortran: Path, tmp_path: Path) -> None
     assert firsts == [-1, -2, -3]
 
 
+def test_large_arrays_of_fortran_need_no_stack(programs: Path) -> None:
+    folder = programs / "large"  # of a module that is compiled otherwise
+    folder.mkdir()
+    # -Ofast puts temporary arrays on the stack
+    program = compile_fortran(CAPI / "fortran_large.f90", folder / "large", "-Ofast")
+    ran("sh", "-c", f"ulimit -s 4096; exec {program}", timeout=300)
+
+
 @pytest.mark.long
 def test_the_fortran_module_is_clean_under_valgrind(fortran: Path, tmp_path: Path) -> None:
     valgrind(fortran, tmp_path)

@@ -261,21 +261,34 @@ double merit(const C& problem, const Solution& solution, fclib_merit kind = MERI
 
 // ---- files
 
+namespace detail {
+
+/// A text as C takes it. Throws if C would take only a part of it.
+inline const char* text(const char* name, const std::string& value) {
+  if (const std::size_t end = value.find('\0'); end != std::string::npos) {
+    throw Error(std::string(name) + " has a zero byte, at " + std::to_string(end) +
+                ", where C would cut it: " + value.c_str());
+  }
+  return value.c_str();
+}
+
+}  // namespace detail
+
 template <Problem C>
 Owned<C> read(const std::string& path) {
-  return Owned<C>(checked(Calls<C>::read(path.c_str())));
+  return Owned<C>(checked(Calls<C>::read(detail::text("a path", path))));
 }
 
 /// Adds the problem to a file. fclib_set_write_mode() says what happens to one that is there
 /// already.
 template <Problem C>
 void write(const std::string& path, const C& problem) {
-  checked(Calls<C>::write(const_cast<C*>(&problem), path.c_str()));
+  checked(Calls<C>::write(const_cast<C*>(&problem), detail::text("a path", path)));
 }
 
 /// "global", "local", ...: the problem that the solution of the file belongs to.
 inline std::string_view kind(const std::string& path) {
-  return checked(fclib_problem_kind(path.c_str()));
+  return checked(fclib_problem_kind(detail::text("a path", path)));
 }
 
 namespace detail {
@@ -285,7 +298,7 @@ inline Sizes sizes_in(const std::string& path) {
   int m = 0;
   int p = 0;
   int nc = 0;
-  checked(fclib_problem_sizes(path.c_str(), &n, &m, &p, &nc));
+  checked(fclib_problem_sizes(detail::text("a path", path), &n, &m, &p, &nc));
   return {static_cast<std::size_t>(n), static_cast<std::size_t>(m), static_cast<std::size_t>(p),
           static_cast<std::size_t>(nc)};
 }
@@ -318,7 +331,7 @@ struct Array {
 /// The solution in a file. Throws if there is none.
 inline Solution read_solution(const std::string& path) {
   const Sizes size = detail::sizes_in(path);
-  const detail::Array found(checked(fclib_read_solution(path.c_str())), 1);
+  const detail::Array found(checked(fclib_read_solution(detail::text("a path", path))), 1);
   return detail::copied(*found.data, size);
 }
 
@@ -327,14 +340,14 @@ inline Solution read_solution(const std::string& path) {
 inline void write_solution(const std::string& path, const Solution& solution) {
   detail::require_sizes(solution, detail::sizes_in(path));
   fclib_solution view = solution.view();
-  checked(fclib_write_solution(&view, path.c_str()));
+  checked(fclib_write_solution(&view, detail::text("a path", path)));
 }
 
 /// The guesses in a file, if there are any.
 inline std::vector<Solution> read_guesses(const std::string& path) {
   const Sizes size = detail::sizes_in(path);
   int count = 0;
-  fclib_solution* const first = fclib_read_guesses(path.c_str(), &count);
+  fclib_solution* const first = fclib_read_guesses(detail::text("a path", path), &count);
   if (first == nullptr && *fclib_last_error() != '\0') fail();
   const detail::Array found(first, count);
   std::vector<Solution> guesses;
@@ -352,7 +365,8 @@ inline void write_guesses(const std::string& path, std::span<const Solution> gue
     detail::require_sizes(guess, size);
     views.push_back(guess.view());
   }
-  checked(fclib_write_guesses(detail::count(views.size()), views.data(), path.c_str()));
+  checked(
+      fclib_write_guesses(detail::count(views.size()), views.data(), detail::text("a path", path)));
 }
 
 // ---- pictures
@@ -413,7 +427,7 @@ auto with_view(const Geometry& geometry, const Call& call) {
     return values.empty() ? nullptr : values.data();
   };
   std::vector<const char*> names;
-  for (const std::string& name : geometry.name) names.push_back(name.c_str());
+  for (const std::string& name : geometry.name) names.push_back(detail::text("a name", name));
   fclib_geometry c{};
   c.size = sizeof c;
   c.nc = detail::count(nc);
@@ -449,8 +463,9 @@ auto with_view(const Geometry& geometry, const Call& call) {
   }
   c.period = array("period", geometry.period, 2);
   c.planar = geometry.planar ? 1 : 0;
-  c.unit = geometry.unit.empty() ? nullptr : geometry.unit.c_str();
-  c.mass_unit = geometry.mass_unit.empty() ? nullptr : geometry.mass_unit.c_str();
+  c.unit = geometry.unit.empty() ? nullptr : detail::text("unit", geometry.unit);
+  c.mass_unit =
+      geometry.mass_unit.empty() ? nullptr : detail::text("mass_unit", geometry.mass_unit);
   c.mass = array("mass", geometry.mass, nb);
   c.inertia = array("inertia", geometry.inertia, 3 * nb);
   c.center = array("center", geometry.center, 3 * nb);
@@ -467,7 +482,7 @@ auto with_view(const Geometry& geometry, const Call& call) {
 /// Adds a geometry to a file that has a problem with the same number of contacts.
 inline void write_geometry(const std::string& path, const Geometry& geometry) {
   detail::with_view(geometry, [&](const fclib_geometry& view) {
-    return checked(fclib_write_geometry(&view, path.c_str()));
+    return checked(fclib_write_geometry(&view, detail::text("a path", path)));
   });
 }
 
@@ -481,8 +496,9 @@ enum class Start { create, go_on };
 class SequenceWriter {
  public:
   explicit SequenceWriter(const std::string& path, Start start = Start::create)
-      : handle_(checked(start == Start::create ? fclib_sequence_create(path.c_str(), nullptr)
-                                               : fclib_sequence_continue(path.c_str()))) {}
+      : handle_(checked(start == Start::create
+                            ? fclib_sequence_create(detail::text("a path", path), nullptr)
+                            : fclib_sequence_continue(detail::text("a path", path)))) {}
 
   /// Begins a step of a world.
   template <Problem C>
@@ -526,7 +542,7 @@ class SequenceWriter {
 
 /// How many confirmed steps a sequence has.
 inline std::size_t sequence_size(const std::string& path) {
-  const int size = fclib_sequence_size(path.c_str());
+  const int size = fclib_sequence_size(detail::text("a path", path));
   if (size < 0) fail();
   return static_cast<std::size_t>(size);
 }
@@ -606,9 +622,10 @@ Result solve(const C& problem, const std::string& solver = "auto", const Options
   const detail::Handle<fclib_options> handle(checked(fclib_options_create()));
   fclib_options* const asked = handle.get();
   for (const auto& [name, value] : options.solver_options) {
-    checked(fclib_options_set_text(asked, name.c_str(), value.c_str()));
+    checked(fclib_options_set_text(asked, detail::text("the name of an option", name),
+                                   detail::text("the value of an option", value)));
   }
-  checked(fclib_options_set_text(asked, "solver", solver.c_str()));
+  checked(fclib_options_set_text(asked, "solver", detail::text("the name of a solver", solver)));
   const auto set = [asked](const char* name, double value) {
     if (value != 0) checked(fclib_options_set_number(asked, name, value));
   };

@@ -72,6 +72,18 @@ void files(const std::string& folder) {
   THROWS("no such file", fclib::read<fclib_global>(folder + "/missing"));
   THROWS("holds no solution", fclib::read_solution(path));
 
+  // C would cut the path
+  const std::string cut = path + std::string("\0.hdf5", 6);
+  const std::string words = "a path has a zero byte, at " + std::to_string(path.size());
+  THROWS(words, fclib::read<fclib_global>(cut));
+  THROWS(words, fclib::write(cut, ball.local()));
+  THROWS(words, fclib::kind(cut));
+  THROWS(words, fclib::read_solution(cut));
+  THROWS(words, fclib::read_guesses(cut));
+  THROWS(words, fclib::SequenceWriter{cut});
+  THROWS(words, fclib::SequenceWriter(cut, fclib::Start::go_on));
+  THROWS(words, fclib::sequence_size(cut));
+
   CHECK(fclib::read_guesses(path).empty());
   THROWS("no such file", fclib::read_guesses(folder + "/missing"));
 
@@ -133,6 +145,10 @@ void solving(C problem) {
   THROWS("has 2 entries, expected 3", fclib::solve(problem, "auto", {.guess = guess}));
   THROWS("no_such", fclib::solve(problem, "no_such"));
   THROWS("no_such", fclib::solve(problem, "nsgs", {.solver_options = {{"no_such", "1"}}}));
+  const std::string name("nsgs\0x", 6);
+  THROWS("the name of a solver has a zero byte, at 4", fclib::solve(problem, name));
+  THROWS("the value of an option has",
+         fclib::solve(problem, "nsgs", {.solver_options = {{"sor", name}}}));
   int told = 0;
   const auto cut = fclib::solve(problem, "nsgs", {.progress = [&](const fclib::Progress& progress) {
                                   ++told;
@@ -169,6 +185,9 @@ void pictures(const std::string& path) {
                            .shape_size = size};
   fclib::write_geometry(path, geometry);
   THROWS("is in the file already", fclib::write_geometry(path, geometry));
+  geometry.unit = std::string("m\0m", 3);
+  THROWS("unit has a zero byte, at 1", fclib::write_geometry(path, geometry));
+  geometry.unit.clear();
   geometry.mass = up;
   THROWS("mass has 3 entries, expected 2", fclib::write_geometry(path, geometry));
   geometry.mass = {};

@@ -802,6 +802,28 @@ def test_merit_1_is_its_formula(ours: Library, kind: str, d: int, p: int) -> Non
 # ---- installed
 
 
+def test_a_folder_of_a_build_is_configured_again(tmp_path: Path) -> None:
+    cmake = shutil.which("cmake")
+    if cmake is None:
+        pytest.skip("there is no cmake")
+
+    def configured(shared: str, environment: dict[str, str]) -> tuple[str, bool]:
+        options = ["-DFCLIB_PYTHON=OFF", f"-DBUILD_SHARED_LIBS={shared}"]
+        ran(cmake, "-S", ROOT, "-B", tmp_path, *options, env=environment, timeout=300)
+        fortran = (tmp_path / "fclib-fortran.pc").is_file()
+        return (tmp_path / "fclib.pc").read_text(), fortran
+
+    # no compiler of Fortran at first, and all other libraries
+    environment = {name: value for name, value in os.environ.items() if name != "FC"}
+    _, fortran = configured("ON", environment | {"FC": "/no/such/compiler"})
+    assert not fortran
+    words, fortran = configured("OFF", environment)
+    assert "hdf5" in words
+    assert "metis" not in words, "a static library has it only if it is asked for"
+    assert "deflate" not in words, "the same"
+    assert fortran == (shutil.which("gfortran") is not None)
+
+
 def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
     cmake, folder = shutil.which("cmake"), library_folder()
     if cmake is None or not (folder / "CMakeCache.txt").is_file():

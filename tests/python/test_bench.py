@@ -403,6 +403,13 @@ def test_export(small: Path, tmp_path: Path) -> None:
     run_cli("export", small, tmp_path / "runs.txt", code=1)
 
 
+def test_export_does_not_write_over_the_store(small: Path, tmp_path: Path) -> None:
+    store = tmp_path / "store.csv"
+    shutil.copy(small, store)
+    assert "is what is read" in run_cli("export", store, store, code=1).stderr
+    assert store.read_bytes() == small.read_bytes()
+
+
 def test_status(small: Path) -> None:
     done = run_cli("--status", small, "--json")
     (record,) = map(json.loads, done.stdout.splitlines())

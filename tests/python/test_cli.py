@@ -820,6 +820,25 @@ def test_a_view_in_place_of_a_folder_leaves_nothing_behind(
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.parametrize("option", [("view", "--out"), ("judge", "--out"), ("judge", "--csv")])
+def test_no_command_writes_over_what_it_reads(option: tuple[str, str], files: list[Path]) -> None:
+    command, name = option
+    before = files[0].read_bytes()
+    for what in (files[0], files[0].parent):
+        if command == "view" and what.is_dir():
+            continue
+        refused = run(command, what, name, files[0], code=1)
+        assert "is what is read, and would be replaced" in refused.stderr
+        assert files[0].read_bytes() == before
+
+
+def test_a_version_of_a_family_needs_no_set() -> None:
+    from fclib.collections import set_index
+
+    pytest.importorskip("mujoco")
+    assert set_index.folders(["Arch"], "1") == ["masonry/Arch"]
+
+
 def test_the_help_of_campaigns_shows_their_options() -> None:
     shown = run("bench", "--help").stdout
     for word in ("merge", "export", "--problems", "--solver", "--time-limit", "--module"):

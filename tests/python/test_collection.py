@@ -953,7 +953,8 @@ def test_get_of_what_is_not_there(site: tuple[str, Path, type[Server]], tmp_path
     with pytest.raises(archives.FetchError, match="404"):
         collections.get(["Chain"], url + "/elsewhere", tmp_path / "copy")
     with pytest.raises(archives.FetchError, match="cannot be fetched"):
-        collections.get(["Chain"], "http://127.0.0.1:9", tmp_path / "copy")
+        collections.get(["Chain"], "http://127.0.0.1:9", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 # ---- in Python

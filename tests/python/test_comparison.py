@@ -106,6 +106,18 @@ def test_a_legend_says_how_many_of_how_many(store: Path, tmp_path: Path) -> None
         assert "nsgs 2 of 3" in text, path.name
 
 
+def test_a_format_of_pictures_is_known_before_anything_is_written(
+    store: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    add_run(store, facts("0000"), "apgd", 1.0)
+    out = tmp_path / "figures"
+    said = helpers_cli.run("profile", store, "--out", out, "--format", "foo", code=1)
+    assert "'foo' is no format of pictures; there is: eps," in said.stderr
+    assert not said.stdout
+    assert not out.exists()
+
+
 def test_a_comparison_of_nothing_says_what_to_do(store: Path) -> None:
     add_run(store, facts("0000"), "apgd", 1.0)
     add_run(store, facts("0001"), "nsgs", 1.0)

@@ -163,8 +163,8 @@ HEAD: Final = [
     "",
     *prose(
         "One command makes this page from the [published runs](published-runs.md). No figure on it"
-        " is typed. [What is measured](measurement.md) explains the words: an instance, solved,"
-        " the common set, the shifted mean."
+        " is typed. [The glossary](glossary.md) explains the words, and [what is"
+        " measured](measurement.md) how runs are measured."
     ),
 ]
 

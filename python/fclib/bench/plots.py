@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
@@ -89,6 +89,16 @@ def wrapped(caption: str, width: int = 110) -> str:
     parts = [part.replace(" ", "\0") for part in caption.split("; ")]
     whole = "; ".join(part if len(part) < width else part.replace("\0", " ") for part in parts)
     return "\n".join(textwrap.wrap(whole, width)).replace("\0", " ")
+
+
+def require_formats(formats: Iterable[str]) -> None:
+    """ValueError for a format that Matplotlib does not write."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    for one in formats:
+        if one not in known:
+            raise ValueError(f"{one!r} is no format of pictures; there is: {', '.join(known)}")
 
 
 @contextmanager

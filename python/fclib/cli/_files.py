@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fclib
+from fclib import _sequence
+from fclib.cli._output import fail
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,18 @@ def contents_of(path: Path) -> Contents:
     kinds = tuple(name for name in names if name not in others)
     owner = "global" if "global" in kinds else kinds[0] if kinds else None
     return Contents(kinds, owner, *(name in names for name in others))
+
+
+def keep_input(output: Path | None, *inputs: Path) -> None:
+    """End the command if the output would replace what it reads: a file, or one of a folder."""
+    if output is None or not output.is_file():
+        return
+    for one in inputs:
+        read, _ = _sequence.place_of(one)
+        if read.is_dir():
+            read /= output.name
+        if read.is_file() and read.samefile(output):
+            fail(f"{output}: is what is read, and would be replaced; name another file")
 
 
 def read_owner(path: Path) -> fclib.Problem:

@@ -22,6 +22,7 @@ from fclib.bench import machine
 from fclib.bench.campaign import SET
 from fclib.bench.runner import RETRIES
 from fclib.bench.store import Status
+from fclib.cli._files import keep_input
 from fclib.cli._output import (
     Json,
     Report,
@@ -377,6 +378,7 @@ def export(
     table: Annotated[Path, typer.Argument(help="A file that ends in .csv or .parquet.")],
 ) -> None:
     """Write all runs of a store as a table."""
+    keep_input(table, store)
     try:
         with bench.Store(store, create=False) as opened:
             count = opened.export(table)

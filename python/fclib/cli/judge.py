@@ -15,6 +15,7 @@ import typer
 import fclib
 from fclib._files import write_csv
 from fclib._sequence import SUFFIXES, steps_or_file
+from fclib.cli._files import keep_input
 from fclib.cli._output import Json, Report, Rows, fail, out, progress_bar, usage_error, words_of
 
 
@@ -44,6 +45,8 @@ def command(
     """
     from fclib import recorders
 
+    for output in (page, table):
+        keep_input(output, *map(Path, what))
     engines = ", ".join(recorders.ENGINES)
     if len(what) > 1 and what[0] not in recorders.ENGINES and not Path(what[0]).exists():
         usage_error(ValueError(f"{what[0]}: is neither a folder nor an engine: {engines}"))

@@ -162,6 +162,10 @@ def command(
         "weigh": weigh.value,
     }
     try:
+        if out_dir is not None:
+            from fclib.bench import plots
+
+            plots.require_formats(formats.split(","))
         with runs as (whole, note):
             if beside and store is None:
                 chosen["merit"] = merit_of(whole, chosen["merit"])

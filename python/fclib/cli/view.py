@@ -12,7 +12,7 @@ import typer
 import fclib
 from fclib import _sequence
 from fclib._files import is_open_or_device
-from fclib.cli._files import contents_of
+from fclib.cli._files import contents_of, keep_input
 from fclib.cli._output import err, fail, out
 
 
@@ -41,6 +41,7 @@ def command(
     """
     if serve and target is not None:
         raise typer.BadParameter("--serve serves the page, and --out writes it")
+    keep_input(target, file)
     from fclib.report import ReportError, browser, serving, view
 
     try:

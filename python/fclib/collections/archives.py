@@ -12,6 +12,7 @@ import shutil
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -136,7 +137,13 @@ def get(
     archives.mkdir(parents=True, exist_ok=True)
     base = url if url.endswith("/") else url + "/"
     (archives / REGISTRY).unlink(missing_ok=True)
-    download(base + REGISTRY, archives / REGISTRY)
+    try:
+        download(base + REGISTRY, archives / REGISTRY)
+    except FetchError:
+        for made in (archives, folder):  # nothing is left of a wrong address
+            with suppress(OSError):
+                made.rmdir()
+        raise
     # its messages are for a console of its own
     pooch.get_logger().setLevel("WARNING")
     fetcher = pooch.create(path=archives, base_url=base, registry=None)

@@ -42,9 +42,9 @@ def folders(name: str) -> list[str]:
 def versions(folder: str) -> list[str]:
     """The stored versions of SET/FAMILY, the oldest first."""
     base = root()
-    if base is None:
+    name, _, family = folder.partition("/")
+    if base is None or not family:
         return []
-    name, family = folder.split("/")
     found = [
         path.stem.removeprefix(f"{family}-")
         for path in (base / name).glob(f"{family}-*{trajectory.SUFFIX}")

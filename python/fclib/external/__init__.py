@@ -76,7 +76,7 @@ def find(name: str) -> _core.SolverInfo | None:
         if not name.startswith(adapter.PREFIX):
             continue
         if word := adapter.missing():
-            raise _core.OptionError(f"solver '{name}': {word}")
+            raise _core.OptionError(f"solver '{name}': cannot be used here: {word}")
         own: Callable[[str], _core.SolverInfo] | None = getattr(adapter, "find", None)
         if own:
             return own(name)

@@ -41,7 +41,7 @@ LEAST = 1e-16  # least tolerance
 def missing() -> str:
     """The package to install."""
     if importlib.util.find_spec("pinocchio") is None:
-        return "pip install pin"
+        return "pip install 'pin>=4.1'"
     if not hasattr(importlib.import_module("pinocchio"), "ADMMConstraintSolver"):
         return "pip install 'pin>=4.1': the one that is there has no such solvers"
     return ""

@@ -41,6 +41,7 @@ DRAWN: Final = 10  # solvers in a picture
 SHOWN: Final = 5  # families with failures that a row names
 PAGE: Final = _results.ROOT / "docs" / "published-results.md"
 IMAGES: Final = _results.ROOT / "docs" / "images"
+LEAST_BESIDE: Final = 10  # problems that both solve: a mean of fewer says nothing of a set
 SEQUENCES: Final = "sequences"  # the set whose runs are along sequences
 CHOSEN: Final = CHOSEN_FROM.keys() - PART_OF.keys()
 # what favours a solver: how the problems of a set were taken, or an older version
@@ -51,6 +52,8 @@ TAKEN: Final = {
     "the solvers of `matrix` had no part in the choice. A problem was taken if some of the other "
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
+    "hard": "The campaign `hard` was cut: on some of its problems all solvers have run, on the "
+    "others those of `candidates-long` alone. So the figures compare the latter.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
     "programs have run, with their default options, beside the runs of `candidates` and "
     "`matrix` on these. Short solves of Siconos were timed in ticks of the clock, which are some "
@@ -226,7 +229,7 @@ def of_sets(
                          "Each solver on the problems that it has run and takes.")  # fmt: skip
     for one in telling:
         own = one.every.at(one.tolerances[-1])
-        if rows := beside_siconos(own):
+        if (rows := beside_siconos(own)) and both_solve(rows) >= LEAST_BESIDE:
             note = f"Each problem of {one.name} weighs the same; limit {own.instances[0].limit:g} s"
             yield from (f"## How does the default solver compare with Siconos on `{one.name}`?", "")
             yield from prose(BESIDE)
@@ -296,6 +299,11 @@ def table(name: str, rows: Sequence[Row], title: str, note: str) -> list[str]:
 
 
 # ---- what was run
+
+
+def both_solve(rows: Sequence[Row]) -> int:
+    """How many problems the table of `beside_siconos` compares."""
+    return next(int(row["value"]) for row in rows if row["figure"] == "solved by both")
 
 
 def part_row(name: str, parts: Sequence[results.Shard]) -> Row:

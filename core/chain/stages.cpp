@@ -294,13 +294,15 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
   std::vector<std::pair<std::int64_t, double>> looks;  // sweeps, and the error after them
   std::size_t middle = 0;                              // the last look of the first half
   std::int64_t in_sight = 0;                           // sweeps as an end was in sight
+  const auto most_sweeps = [&] {
+    return std::max(rules.limit, static_cast<std::int64_t>(hope * static_cast<double>(in_sight)));
+  };
   std::int64_t k = 0;
-  while (asks || k < rules.limit) {
+  while (k < most_sweeps()) {
     // one sweep solves some problems; a few sweeps solve some with few contacts
     const bool few = problem_.nc() <= few_contacts;
     const std::int64_t wanted = k == 0 ? 1 : k < interval ? (few ? k + 1 : interval - 1) : interval;
-    std::int64_t count = std::min(wanted, tracker_.left());
-    if (!asks) count = std::min(count, rules.limit - k);
+    const std::int64_t count = std::min({wanted, most_sweeps() - k, tracker_.left()});
     for (std::int64_t j = 0; j < count; ++j) gauss_seidel_->sweep(r_, u_);
     k += count;
     double error = relative_error<Cone>(problem_, u_, r_);

@@ -281,7 +281,7 @@ def test_storages_that_a_format_does_not_have(tmp_path: Path) -> None:
     for ending, storage, stored in ((".hdf5", "csc", "triplet"), (".dat", "csr", "csc")):
         target = tmp_path / f"out{ending}"
         result = run("--storage", storage, source, target, code=1)
-        start = f"fclib: {source}: the matrices of a global problem are {stored} in "
+        start = f"fclib: {source}: FCLIB writes the matrices of a global problem as {stored} in "
         assert result.stderr.startswith(start)
         assert len(result.stderr.splitlines()) == 1
         assert not target.exists()

@@ -168,8 +168,8 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
         if stored != request.storage.value:
             file = "an FCLIB file" if output is Format.hdf5 else "a text of Siconos"
             raise fclib.UnsuitableError(
-                f"{source}: the matrices of a {problem.kind} problem are {stored} in {file}, "
-                f"not {request.storage.value}"
+                f"{source}: FCLIB writes the matrices of a {problem.kind} problem as {stored} in "
+                f"{file}, not {request.storage.value}"
             )
     if request.folder is not None:  # only now: what cannot be read leaves no folder
         request.folder.mkdir(parents=True, exist_ok=True)

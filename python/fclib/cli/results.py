@@ -129,6 +129,8 @@ def verify(
         if not folder.is_dir():
             fail(f"{folder}: is no folder")
     for path in paths:
+        if not path.is_file():
+            fail(f"{path}: there is no such file")
         record: dict[str, Any] = {"part": str(path)}
         try:
             wrong = results.verify(path)

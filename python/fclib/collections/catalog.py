@@ -270,8 +270,11 @@ def where(table: Any, condition: str) -> Any:
     except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         if isinstance(error, ConditionError):
             raise
-        reason = str(error).splitlines()[0] if str(error) else "too long"
-        raise ConditionError(f"{condition!r}: is no condition: {reason}") from None
+        reason = error.msg if isinstance(error, SyntaxError) else str(error).partition("\n")[0]
+        raise ConditionError(
+            f"{condition!r}: is no condition: {reason or 'too long'}; write one as in"
+            ' "nc > 1000 and mu < 0.5"'
+        ) from None
     except (NotImplementedError, TypeError, pa.ArrowException) as error:
         reason = str(error).splitlines()[0]
         raise ConditionError(f"{condition!r}: values that cannot be compared: {reason}") from None

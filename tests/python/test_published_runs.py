@@ -320,7 +320,8 @@ def test_runs_of_a_larger_limit_count_on_the_board_and_smaller_ones_are_told(
     rows = results.leaders(results.shards(parts), told.append)
     solved = {(row["solver"], row["solved"]) for row in rows}
     assert solved == {("nsgs", 4), ("apgd", 4), ("bb", 3), ("bb", 4)}
-    assert told == ["small: admm is left out: it had 5 s or less, and most solvers 10 s"]
+    why = "they had 5 s or less, and most solvers 10 s"
+    assert told == [f"small: left out because {why}: admm"]
     for row in rows:
         low, high = map(float, row["95 % interval"].split(" to "))
         assert low - 0.01 <= row["share"] <= high + 0.01

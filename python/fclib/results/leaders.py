@@ -31,7 +31,7 @@ def leaders(parts: Sequence[Shard], tell: Tell | None = None) -> list[dict[str, 
 
     Args:
         parts: the parts.
-        tell: is called with a line for each solver that is left out of a set.
+        tell: is called with a line for each reason why solvers are left out of a set.
 
     Raises:
         BesideError: parts of several machines, of which one was not calibrated.
@@ -58,14 +58,15 @@ def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[
     solver, started = words_in(runs, "solver"), numbers_in(runs, "started")
     labels = {found: named(found, measured) for found in map(str, solver.present())}
     compared = {labels[one] for one in costs.solvers}
+    few = "they have run too few of its problems"
+    left_out: dict[str, list[str]] = defaultdict(list)  # the solvers, by the reason
     for one in sorted((short.keys() | set(labels.values())) - compared):
-        if tell is None:
-            break
-        why = "has run too few of its problems"
-        if one in short:
-            most = max(numbers_in(runs, "time_limit"))
-            why = f"had {short[one]:g} s or less, and most solvers {most:g} s"
-        tell(f"{name}: {one} is left out: it {why}")
+        most = max(numbers_in(runs, "time_limit"))
+        limits = f"they had {short.get(one, 0):g} s or less, and most solvers {most:g} s"
+        left_out[limits if one in short else few].append(one)
+    for why, names in left_out.items():
+        if tell is not None:
+            tell(f"{name}: left out because {why}: {', '.join(names)}")
     weights = {tol: costs.at(tol).weights(WEIGH) for tol in costs.tolerances}
     found = []
     for row in profiles.summary(costs, weigh=WEIGH):

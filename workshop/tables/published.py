@@ -227,12 +227,14 @@ def of_sets(
         yield from ("## Who fails where, and why?", "")
         yield from table("published-failures", failures, "What ends the runs that fail",
                          "Each solver on the problems that it has run and takes.")  # fmt: skip
+    told = BESIDE  # once
     for one in telling:
         own = one.every.at(one.tolerances[-1])
         if (rows := beside_siconos(own)) and both_solve(rows) >= LEAST_BESIDE:
             note = f"Each problem of {one.name} weighs the same; limit {own.instances[0].limit:g} s"
             yield from (f"## How does the default solver compare with Siconos on `{one.name}`?", "")
-            yield from prose(BESIDE)
+            yield from prose(told) if told else ()
+            told = ""
             yield from table(
                 f"published-{one.name}-siconos", rows, HINDSIGHT, f"{note}; {one.caption}."
             )

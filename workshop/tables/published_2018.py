@@ -76,12 +76,12 @@ DISTANCES: Final = (
     "The distance is the largest vertical one of the two curves of a solver, ours and that of the "
     "paper. Chance alone gives distances up to the band of Kolmogorov and Smirnov (95 %), which "
     "shrinks with the number of our problems. The band takes the curve of the paper as exact. A "
-    f"larger distance points to a difference. It is {CODE} if Siconos' own solver, with its "
-    "default options and on our problems, comes within the band of the paper's curve in the place "
-    f"of ours. It is {PROBLEMS} (or the machine) if that solver comes within the band of our curve "
-    "instead: the program of the paper differs from the paper as ours does. If it comes within "
-    f"neither, it may be {BOTH}. If Siconos' own solver has not run on enough of our problems, "
-    f"they are {OPEN}. If our band is wider than half the height of a figure, there are {FEW}."
+    "larger distance points to a difference. Siconos' own solver has run on our problems too, with "
+    "its default options. If its curve is within the band of the paper's curve, the difference is "
+    f"in {CODE}. If it is within the band of ours instead, the difference is in {PROBLEMS} (or in "
+    "the machine): the program of the paper differs from the paper as ours does. If it is within "
+    f"neither, it may be {BOTH}. If that solver has not run on enough of our problems, they are "
+    f"{OPEN}. If our band is wider than half the height of a figure, there are {FEW}."
 )
 
 

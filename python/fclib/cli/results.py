@@ -129,7 +129,7 @@ def verify(
         if not folder.is_dir():
             fail(f"{folder}: is no folder")
     for path in paths:
-        if not path.is_file():
+        if not path.exists():
             fail(f"{path}: there is no such file")
         record: dict[str, Any] = {"part": str(path)}
         try:

@@ -319,8 +319,9 @@ const char* fclib_version(void);
  *  library, and stays until the next call of this thread. */
 const char* fclib_last_error(void);
 
-/** New. Makes a message that of the last call of this thread, and calls the handler with it. For
- *  layers over this library, which check more, such as the Fortran module. */
+/** New. Keeps a message for fclib_last_error() of this thread and calls the handler with it, as a
+ *  call that fails does. For layers over this library, which check more, such as the Fortran
+ *  module. */
 void fclib_set_error(const char* message);
 
 /** New. A function that gets every failure, in the thread in which it happens. It must return, and

@@ -15,7 +15,6 @@
 struct fclib_sequence {
   fclib::SequenceWriter writer;
   std::optional<fclib::Problem> outline;
-  bool refused = false;  // the last problem, so that there is no step to add to
 
   fclib_sequence(const char* path, const fclib::SequenceOptions& options) : writer(path, options) {}
 };
@@ -48,12 +47,12 @@ template <class C>
 int add_problem(fclib_sequence* sequence, const C* problem, int world) {
   return guarded(0, [&] {
     fclib_sequence& own = given(sequence, "sequence");
-    own.refused = true;
+    own.outline.reset();
+    own.writer.end_step();  // also if this problem is refused
     const C& c = given(problem, "problem");
     const ProblemView view = view_as_given(c);
     own.writer.add(view, world);
     own.outline = outline_of<CoreOf<C>>(view);
-    own.refused = false;
     return 1;
   });
 }
@@ -67,10 +66,7 @@ std::size_t require_steps(const char* path) {
 
 /// The sizes of the problem of the step.
 const Problem& outline_of(const fclib_sequence& sequence) {
-  if (sequence.refused) {
-    fail("sequence", "has no step to add to: the call that was to add its problem failed");
-  }
-  if (!sequence.outline) fail("sequence", "has no step yet: its problem comes first");
+  if (!sequence.outline) fail("sequence", "has no step to add to: its problem comes first");
   return *sequence.outline;
 }
 

@@ -42,9 +42,9 @@ constexpr double instead_of_factors = 100;  // cost of steps [factorisations] wi
 
 // Gauss-Seidel
 constexpr std::int64_t sweeps_per_look = 5;  // sweeps between two looks at the error
-constexpr Index few_contacts = 10;           // so few are looked at after 1, 3 and 5 sweeps
+constexpr Index few_contacts = 10;           // so few are looked at after 1, 3 and 7 sweeps
 constexpr double extension = 20;  // an end is in sight if at most so many limits are left
-constexpr double hope = 2;        // sweeps go on to so many times those as an end was in sight
+constexpr double hope = 2;  // sweeps end at so many times the last number with an end in sight
 
 // sweeps and gradients that go on
 constexpr std::int64_t steps_per_look = 10;  // steps between two looks at the error
@@ -293,7 +293,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
   const bool asks = rules.left > 0 || rules.worth > 0;
   std::vector<std::pair<std::int64_t, double>> looks;  // sweeps, and the error after them
   std::size_t middle = 0;                              // the last look of the first half
-  std::int64_t in_sight = 0;                           // sweeps as an end was in sight
+  std::int64_t in_sight = 0;  // sweeps at the last look with an end in sight
   const auto most_sweeps = [&] {
     return std::max(rules.limit, static_cast<std::int64_t>(hope * static_cast<double>(in_sight)));
   };

@@ -119,8 +119,8 @@ struct GaussSeidelStage {
         option(
             "limit", &O::limit, "sweeps", {1, 1e9},
             "The largest number of sweeps. With left or worth, the sweeps go on instead while an "
-            "end is in sight: at the rate of their second half, at most 20 times this number "
-            "are left. They end if none was in sight for half of them."),
+            "end is in sight: at the rate of their second half, at most left sweeps are left (20 "
+            "times limit if left is 0). They end if none was in sight for half of them."),
         option("left", &O::left, "sweeps", {0, 1e9},
                "The largest number of sweeps that may be left, at their rate. 0: any number."),
         option("worth", &O::worth, "factorisations a digit", {0},

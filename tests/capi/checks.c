@@ -354,7 +354,7 @@ static void sequence(void) {
   SAYS("another writer has it open");
 
   CHECK(!fclib_sequence_add_solution(written, &s));
-  SAYS("has no step yet");
+  SAYS("sequence: has no step to add to: its problem comes first");
   CHECK(fclib_sequence_add_local(written, &a, 0));
   CHECK(fclib_sequence_add_solution(written, &s));
   CHECK(fclib_sequence_add_global(written, &b, 7));
@@ -384,7 +384,7 @@ static void sequence(void) {
   for (int wrong = 0; wrong < 2; ++wrong) {
     CHECK(!fclib_sequence_add_local(written, wrong ? &a : &bad, wrong ? -1 : 0));
     CHECK(!fclib_sequence_add_solution(written, &s));
-    SAYS("sequence: has no step to add to: the call that was to add its problem failed");
+    SAYS("has no step to add to");
     CHECK(!fclib_sequence_add_guesses(written, 2, more));
     SAYS("has no step to add to");
     CHECK(!fclib_sequence_add_geometry(written, &g));

@@ -16,7 +16,7 @@ end module
 
 program checks
   use, intrinsic :: iso_c_binding
-  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: error_unit
   use fclib
   use hearing
@@ -112,6 +112,10 @@ contains
     call fclib_set(problem%mu, [0.25_dp, 0.75_dp])
     view => fclib_vector(problem%mu, 2)
     call check(all(view == [0.25_dp, 0.75_dp]), "vectors")
+    view => fclib_vector(problem%mu, 1)
+    call fclib_set(problem%mu, view)
+    view => fclib_vector(problem%mu, 1)
+    call check(view(1) == 0.25_dp, "a part of what is replaced")
     call check(size(fclib_vector(problem%q, 5)) == 0, "no vector")
     call fclib_delete(problem)
     call check(.not. c_associated(problem%W) .and. .not. c_associated(problem%mu), "deleted")
@@ -175,6 +179,12 @@ contains
     y = -1
     call check(fclib_solve(problem, "auto", other, certificate_y=y), "with room for a certificate")
     call check(all(y == -1._dp) .and. fclib_certificate(problem, [1._dp]) == 0, "there is none")
+
+    block
+      type(fclib_local) :: nothing
+      call check(ieee_is_nan(fclib_certificate(nothing, [1._dp])), "a problem without a matrix")
+      call check(index(fclib_error(), "W") > 0, "the matrix is named")
+    end block
 
     call check(fclib_write(problem, path), "write")
     call check(.not. fclib_write(problem, path), "it is there already")

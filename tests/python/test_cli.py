@@ -832,11 +832,16 @@ def test_no_command_writes_over_what_it_reads(option: tuple[str, str], files: li
         assert files[0].read_bytes() == before
 
 
-def test_a_version_of_a_family_needs_no_set() -> None:
-    from fclib.collections import set_index
-
-    pytest.importorskip("mujoco")
-    assert set_index.folders(["Arch"], "1") == ["masonry/Arch"]
+def test_judge_writes_its_own_page_and_table_again(files: list[Path], tmp_path: Path) -> None:
+    folder = tmp_path / "steps"
+    folder.mkdir()
+    problem = fclib.read(files[0])
+    fclib.write(folder / "0.hdf5", problem, guesses=[fclib.solve(problem).solution])
+    for _ in range(2):
+        run("judge", folder, "--csv", folder / "table.csv")
+    # what follows a script is for the script
+    refused = run("judge", "mujoco", tmp_path / "none.py", "x" * 300, "--csv", __file__, code=1)
+    assert "is what is read" not in refused.stderr
 
 
 def test_the_help_of_campaigns_shows_their_options() -> None:

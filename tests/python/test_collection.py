@@ -946,6 +946,10 @@ def test_get_refuses_what_the_registry_does_not_say(
     assert not list((tmp_path / "copy").glob("*/*/*.hdf5"))
 
 
+def test_a_version_of_a_family_needs_no_set() -> None:
+    assert set_index.folders(["Arch"], "1") == ["masonry/Arch"]
+
+
 def test_get_of_what_is_not_there(site: tuple[str, Path, type[Server]], tmp_path: Path) -> None:
     url, _, _ = site
     with pytest.raises(KeyError, match="Chain is not published"):
@@ -954,6 +958,10 @@ def test_get_of_what_is_not_there(site: tuple[str, Path, type[Server]], tmp_path
         collections.get(["Chain"], url + "/elsewhere", tmp_path / "copy")
     with pytest.raises(archives.FetchError, match="cannot be fetched"):
         collections.get(["Chain"], "http://127.0.0.1:9", tmp_path / "new")
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(archives.FetchError):
+        collections.get(["Chain"], "http://127.0.0.1:9", tmp_path / "mine")
+    assert not list((tmp_path / "mine").iterdir())
     assert not (tmp_path / "new").exists()
 
 

@@ -657,7 +657,7 @@ def test_c_refuses_what_would_spoil_a_step(tmp_path: Path) -> None:
     source.write_text(TWICE)
     program = compile_program(source, tmp_path / "twice")
     first, second, third = ran(program, path).stdout.splitlines()
-    assert "has no step yet" in first
+    assert "its problem comes first" in first
     assert "world: is -1, but must be 0 or more" in second
     assert "/solution/u: was already given to this step" in third
     steps = Sequence(path)

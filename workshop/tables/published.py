@@ -53,7 +53,8 @@ TAKEN: Final = {
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
     "hard": "The campaign `hard` was cut: on some of its problems all solvers have run, on the "
-    "others those of `candidates-long` alone. So the figures compare the latter.",
+    "others those of `candidates-long` alone. So the figures compare the latter. The table of "
+    "who solves what has all.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
     "programs have run, with their default options, beside the runs of `candidates` and "
     "`matrix` on these. Short solves of Siconos were timed in ticks of the clock, which are some "
@@ -212,8 +213,9 @@ def of_sets(
     yield from ("## Who solves what?", "")
     yield from prose(
         "The tables count the problems of each family that a solver solves. Here a problem is "
-        "solved only if its renumbered copy is solved too, as the rule of the sets asks. A dash "
-        "says that the solver takes none of them."
+        "solved only if its renumbered copy is solved too, as the rule of the sets asks. `1 of 3` "
+        "says that the solver takes three of them, or has run three. A dash says that there is "
+        "none."
     )
     for one in sets:
         for tol in one.tolerances:
@@ -402,7 +404,9 @@ def matrix_rows(one: Set, tol: float) -> list[Row]:
         row = {"family": name or "all", "problems": len(own)}
         for solver in solvers:
             mine = [solved[digest, solver] for digest in own if (digest, solver) in solved]
-            row[solver] = sum(mine) if mine else "-"
+            # a solver may take a part of them, or have run a part of them
+            whole = sum(mine) if len(mine) == len(own) else f"{sum(mine)} of {len(mine)}"
+            row[solver] = whole if mine else "-"
         found.append(row)
     return found
 

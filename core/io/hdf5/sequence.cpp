@@ -261,11 +261,11 @@ class SequenceWriter::File {
   /// Begins a step with its problem. After an error there is no step.
   void begin(const ProblemView& problem, Index world) {
     locked([&] {
+      end_step();
       if (world < 0) {
         throw Error(ErrorKind::option, "is " + std::to_string(world) + ", but must be 0 or more",
                     "world");
       }
-      end_step();
       world_ = world;
       all_or_nothing([&] { put_problem(problem); });
       step_ = true;

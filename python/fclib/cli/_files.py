@@ -40,7 +40,7 @@ def keep_input(output: Path | None, *inputs: Path) -> None:
         return
     for one in inputs:
         read, _ = _sequence.place_of(one)
-        if read.is_dir():
+        if read.is_dir() and output.suffix in _sequence.SUFFIXES:
             read /= output.name
         if read.is_file() and read.samefile(output):
             fail(f"{output}: is what is read, and would be replaced; name another file")

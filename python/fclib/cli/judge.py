@@ -45,8 +45,10 @@ def command(
     """
     from fclib import recorders
 
+    # what follows a script is for the script
+    read = what[1:2] if what[0] in recorders.ENGINES else what
     for output in (page, table):
-        keep_input(output, *map(Path, what))
+        keep_input(output, *map(Path, read))
     engines = ", ".join(recorders.ENGINES)
     if len(what) > 1 and what[0] not in recorders.ENGINES and not Path(what[0]).exists():
         usage_error(ValueError(f"{what[0]}: is neither a folder nor an engine: {engines}"))

@@ -134,15 +134,16 @@ def get(
     pooch = pooch_module()
     folder = Path(folder)
     archives = folder / ".archives"
+    made = [one for one in (archives, folder) if not one.exists()]
     archives.mkdir(parents=True, exist_ok=True)
     base = url if url.endswith("/") else url + "/"
     (archives / REGISTRY).unlink(missing_ok=True)
     try:
         download(base + REGISTRY, archives / REGISTRY)
     except FetchError:
-        for made in (archives, folder):  # nothing is left of a wrong address
+        for one in made:  # nothing is left of a wrong address
             with suppress(OSError):
-                made.rmdir()
+                one.rmdir()
         raise
     # its messages are for a console of its own
     pooch.get_logger().setLevel("WARNING")

@@ -59,11 +59,12 @@ def of_set(name: str, parts: Sequence[Shard], tell: Tell | None = None) -> list[
     labels = {found: named(found, measured) for found in map(str, solver.present())}
     compared = {labels[one] for one in costs.solvers}
     few = "they have run too few of its problems"
+    most = max(numbers_in(runs, "time_limit"))
     left_out: dict[str, list[str]] = defaultdict(list)  # the solvers, by the reason
     for one in sorted((short.keys() | set(labels.values())) - compared):
-        most = max(numbers_in(runs, "time_limit"))
-        limits = f"they had {short.get(one, 0):g} s or less, and most solvers {most:g} s"
-        left_out[limits if one in short else few].append(one)
+        limited = one in short
+        why = f"they had {short[one]:g} s or less, and most solvers {most:g} s" if limited else few
+        left_out[why].append(one)
     for why, names in left_out.items():
         if tell is not None:
             tell(f"{name}: left out because {why}: {', '.join(names)}")

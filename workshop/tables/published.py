@@ -405,8 +405,10 @@ def matrix_rows(one: Set, tol: float) -> list[Row]:
         for solver in solvers:
             mine = [solved[digest, solver] for digest in own if (digest, solver) in solved]
             # a solver may take a part of them, or have run a part of them
-            whole = sum(mine) if len(mine) == len(own) else f"{sum(mine)} of {len(mine)}"
-            row[solver] = whole if mine else "-"
+            count: object = sum(mine)
+            if len(mine) < len(own):
+                count = f"{count} of {len(mine)}" if mine else "-"
+            row[solver] = count
         found.append(row)
     return found
 

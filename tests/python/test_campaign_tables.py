@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fclib
 from fclib import bench
 from fclib.bench import comparison, profiles
 from workshop.tables import campaign as tables
+from workshop.tables import siconos_in_a_loop
 
 pytest.importorskip("mujoco", reason="simulates")
 
@@ -214,3 +216,27 @@ def test_without_siconos_there_is_no_table_beside_it(tmp_path: Path, name: str) 
     bench.run_campaign(bench.Campaign.of(entries), path)
     with pytest.raises(SystemExit, match="PAIRS has no new" if name == "pairs" else "no runs of"):
         made(path, name)
+
+
+def test_the_problems_of_a_loop_are_those_that_siconos_takes(tmp_path: Path) -> None:
+    one = fclib.LocalProblem(W=np.eye(3), q=[-1.0, 2.0, 0.0], mu=[0.5])
+    two = fclib.LocalProblem(W=np.eye(6), q=[-1.0, 2.0, 0.0] * 2, mu=[0.5, 0.5])
+    planar = fclib.LocalProblem(W=np.eye(4), q=[-1.0, 2.0] * 2, mu=[0.5, 0.5], spacedim=2)
+    smooth = fclib.LocalProblem(W=np.eye(6), q=[-1.0, 2.0, 0.0] * 2, mu=[0.0, 0.0])
+    for name, problem in {"0": one, "1": planar, "2": smooth, "3": two, "4": two}.items():
+        fclib.write(tmp_path / f"{name}.hdf5", problem)
+    files = sorted(tmp_path.glob("*.hdf5"))
+    taken = [path.stem for path, _ in siconos_in_a_loop.taken(files, (2, 5), 1)]
+    assert taken == ["3"]
+    assert [path.stem for path, _ in siconos_in_a_loop.taken(files, (1, 5), 9)] == ["0", "3", "4"]
+
+
+def test_where_the_time_goes() -> None:
+    rows = siconos_in_a_loop.where_the_time_goes([{"a_b": 0.6, "c": 0.4}, {"a_b": 0.2}])
+    told = {row["stage"]: tuple(row.values())[1:] for row in rows}
+    assert told == {
+        "a b": ("0.400", 2, 1),
+        "outside the stages": ("0.400", 1, 1),
+        "c": ("0.200", 1, 0),
+    }
+    assert siconos_in_a_loop.where_the_time_goes([]) == []

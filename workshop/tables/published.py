@@ -53,8 +53,8 @@ TAKEN: Final = {
     "solvers fail on it. So the sets favour `auto` and the solvers of `matrix`. The figures show "
     "who solves what, and what nobody solves. They show less well by how much `auto` is better.",
     "hard": "The campaign `hard` was cut: on some of its problems all solvers have run, on the "
-    "others those of `candidates-long` alone. So the figures compare the latter. The table of "
-    "who solves what has all.",
+    "others those of `candidates-long` and a few more. So the figures compare those of "
+    "`candidates-long`. The table of who solves what has all.",
     "matrix-peers": "`standard-peers` has the problems of `standard` that the solvers of other "
     "programs have run, with their default options, beside the runs of `candidates` and "
     "`matrix` on these. Short solves of Siconos were timed in ticks of the clock, which are some "

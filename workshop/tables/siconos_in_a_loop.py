@@ -39,12 +39,17 @@ LEAST_SHARE = 0.01  # of a stage that is shown
 
 
 def taken(files: Sequence[Path], contacts: Sequence[int], most: int) -> Iterator[tuple[Path, Any]]:
-    """The first problems of each folder that have so many contacts."""
+    """The first problems of each folder with so many contacts that Siconos' solvers take.
+
+    These are local and spatial ones with Coulomb friction, without bilateral constraints.
+    """
     count: Counter[Path] = Counter()
     for path in files:
         if count[path.parent] < most:
-            problem = fclib.read(path)
-            if contacts[0] <= problem.nc <= contacts[1]:
+            problem: Any = fclib.read(path)
+            takes = isinstance(problem, fclib.LocalProblem) and problem.spacedim == 3
+            takes = takes and problem.p == 0 and bool(problem.mu.any())
+            if takes and contacts[0] <= problem.nc <= contacts[1]:
                 count[path.parent] += 1
                 yield path, problem
 

@@ -1,10 +1,13 @@
 #include "convert/eliminate.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "linalg/dependent_columns.hpp"
 #include "linalg/extended.hpp"
@@ -66,6 +69,59 @@ Vector selected(const Vector& a, const std::vector<Index>& places) {
 }
 
 SparseColumns transposed(const SparseColumns& a) { return a.transpose(); }
+
+/// W - V X, and the sizes of the terms of its diagonal. What the bilateral constraints hold
+/// entirely is zero; it must not be the rounding of a difference: an entry is left out if it is at
+/// most `rounding` times its terms.
+std::pair<SparseColumns, Vector> difference(const SparseColumns& w, const SparseColumns& v,
+                                            const SparseColumns& x, double rounding) {
+  const Eigen::Index m = w.rows();
+  std::pair<SparseColumns, Vector> result{SparseColumns(m, m), Vector::Zero(m)};
+  auto& [left, sizes] = result;
+  Vector given = Vector::Zero(m);  // a column of W, and of V X
+  Vector held = Vector::Zero(m);
+  std::vector<char> filled(static_cast<std::size_t>(m), 0);
+  std::vector<Index> rows;
+  const auto fill = [&](Eigen::Index row) {
+    if (std::exchange(filled[static_cast<std::size_t>(row)], 1) == 0) {
+      rows.push_back(static_cast<Index>(row));
+    }
+  };
+  constexpr std::size_t scan = 8;  // the rows of a column with more than m / 8 are not sorted
+  for (Eigen::Index col = 0; col < m; ++col) {
+    for (SparseColumns::InnerIterator at(w, col); at; ++at) {
+      fill(at.row());
+      given[at.row()] = at.value();
+    }
+    for (SparseColumns::InnerIterator factor(x, col); factor; ++factor) {
+      for (SparseColumns::InnerIterator at(v, factor.row()); at; ++at) {
+        fill(at.row());
+        held[at.row()] += at.value() * factor.value();
+      }
+    }
+    if (scan * rows.size() > filled.size()) {
+      rows.clear();
+      for (Index row = 0; row < static_cast<Index>(m); ++row) {
+        if (filled[static_cast<std::size_t>(row)] != 0) rows.push_back(row);
+      }
+    } else {
+      std::sort(rows.begin(), rows.end());
+    }
+    sizes[col] = std::abs(given[col]) + std::abs(held[col]);
+    left.startVec(col);
+    for (const Index row : rows) {
+      const double value = given[row] - held[row];
+      if (std::abs(value) > rounding * (std::abs(given[row]) + std::abs(held[row]))) {
+        left.insertBack(row, col) = value;
+      }
+      given[row] = held[row] = 0;
+      filled[static_cast<std::size_t>(row)] = 0;
+    }
+    rows.clear();
+  }
+  left.finalize();
+  return result;
+}
 
 /// The constraint that follows from others and contradicts them most, if it does so by more than
 /// rounding: by more than a part of its terms. The first `rounding` [m/s] does not count.
@@ -239,16 +295,9 @@ bool Elimination::leave_out_redundant(const SparseColumns& r, const Vector& size
 void Elimination::reduce() {
   const SparseColumns right = v_.transpose();
   const SparseColumns coupling = bilateral_ ? bilateral_->solve(right) : right;
-  // what the bilateral constraints hold entirely is zero; it must not be the rounding of a
-  // difference
   const SparseColumns full = to_eigen(problem_.W);
-  const SparseColumns held = v_ * coupling;
-  SparseColumns w = full - held;
-  const SparseColumns size = SparseColumns(full.cwiseAbs()) + SparseColumns(held.cwiseAbs());
   constexpr double rounding = 16 * std::numeric_limits<double>::epsilon();
-  w.prune([&](Eigen::Index row, Eigen::Index col, double value) {
-    return std::abs(value) > rounding * size.coeff(row, col);
-  });
+  auto [w, sizes] = difference(full, v_, coupling, rounding);
   const Vector impulse = bilateral_ ? bilateral_->solve(s_) : s_;
   plain_.q = problem_.q - v_ * impulse;
 
@@ -263,7 +312,7 @@ void Elimination::reduce() {
   }
   const Vector free = full.diagonal();
   const Vector left = w.diagonal();
-  const Vector terms = Vector(size.diagonal()) + shares.cwiseAbs2();
+  const Vector terms = sizes + shares.cwiseAbs2();
   // if the diagonal entry of a component is rounding, so are its row and its velocity: if W' is
   // semidefinite, |W'_kj|^2 <= W'_kk W'_jj, and a larger entry shows that it is not
   Eigen::Array<bool, Eigen::Dynamic, 1> held_entirely =
@@ -271,15 +320,17 @@ void Elimination::reduce() {
   const auto is_rounding = [&](Eigen::Index k, Eigen::Index j, double value) {
     return value * value <= 2 * rounding * terms[k] * terms[j];
   };
-  for (Eigen::Index col = 0; col < w.outerSize(); ++col) {
-    for (SparseColumns::InnerIterator entry(w, col); entry; ++entry) {
-      if (is_rounding(entry.row(), col, entry.value())) continue;
-      held_entirely[entry.row()] = held_entirely[col] = false;
+  if (held_entirely.any()) {
+    for (Eigen::Index col = 0; col < w.outerSize(); ++col) {
+      for (SparseColumns::InnerIterator entry(w, col); entry; ++entry) {
+        if (is_rounding(entry.row(), col, entry.value())) continue;
+        held_entirely[entry.row()] = held_entirely[col] = false;
+      }
     }
+    w.prune([&](Eigen::Index row, Eigen::Index col, double) {
+      return !held_entirely[row] && !held_entirely[col];
+    });
   }
-  w.prune([&](Eigen::Index row, Eigen::Index col, double) {
-    return !held_entirely[row] && !held_entirely[col];
-  });
   // `impulse` is a sum of terms of s; they may be larger than it in one place
   const double pushes = lengths.dot(impulse.cwiseAbs());
   for (Eigen::Index k = 0; k < left.size(); ++k) {

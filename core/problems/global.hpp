@@ -5,8 +5,9 @@
 //
 // and for each contact Coulomb's law between u and r, as in the local problem.
 //
-// M (n x n) is symmetric positive definite; H (n x m) maps reactions to generalised forces,
-// m = d nc; component 0 of a contact is normal, the others tangential. d = 2 is the planar case.
+// M (n x n) is a mass matrix, symmetric positive definite, or the matrix of an iteration, as a
+// tangent, which need not be symmetric. H (n x m) maps reactions to generalised forces, m = d nc;
+// component 0 of a contact is normal, the others tangential. d = 2 is the planar case.
 //
 // Acary, Bremond, Koziara, Perignon, "FCLIB: a collection of discrete 3D Frictional Contact
 // problems", INRIA RT-0444 (2014), sections 2.4 and 2.5.
@@ -53,12 +54,13 @@ struct GlobalProblem {
                         .unit = "1",
                         .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling, 4 "
                                "or 6 with spin"},
-        Field<P, Matrix>{.name = "M",
-                         .member = &P::M,
-                         .rows = Dim::n,
-                         .cols = Dim::n,
-                         .unit = "kg",
-                         .doc = "mass (or iteration) matrix, symmetric positive definite"},
+        Field<P, Matrix>{
+            .name = "M",
+            .member = &P::M,
+            .rows = Dim::n,
+            .cols = Dim::n,
+            .unit = "kg",
+            .doc = "mass matrix, symmetric positive definite, or matrix of an iteration"},
         Field<P, Matrix>{.name = "H",
                          .member = &P::H,
                          .rows = Dim::n,

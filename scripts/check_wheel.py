@@ -26,7 +26,7 @@ import sys
 from pathlib import Path
 for name in sys.argv[1:]:
     __import__(name)
-import fclib, h5py, numpy as np
+import fclib, fclib._device, h5py, numpy as np
 
 problem = fclib.LocalProblem(W=np.eye(6), q=np.arange(-1.0, 5.0), mu=np.full(2, 0.5))
 fclib.write("ours.hdf5", problem)
@@ -56,6 +56,8 @@ assert solved.status == "converged", solved
 info = fclib._core.build_info()
 assert info["hdf5"] == info["hdf5_compiled"]
 assert info["metis"], "the wheel has no METIS"
+# with all its headers
+assert "struct FewCoordinates" in fclib._device.sources(), "no kernel for a GPU"
 maps = Path("/proc/self/maps")
 if maps.exists():
     loaded = {line.split()[-1] for line in maps.read_text().splitlines() if "hdf5" in line}

@@ -1,6 +1,6 @@
 """Many small problems on a GPU: what `solve_batch` does with arrays that are there.
 
-The method is core/embed/proximal_small.hpp, which CuPy compiles for the sizes of a batch. Arrays of
+The method is core/embed/proximal_small, which CuPy compiles for the sizes of a batch. Arrays of
 other libraries come in without a copy, by DLPack or `__cuda_array_interface__`, and their order of
 work is kept: DLPack makes the stream of CuPy wait for theirs, and theirs for CuPy's.
 """
@@ -8,6 +8,7 @@ work is kept: DLPack makes the stream of CuPy wait for theirs, and theirs for Cu
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,8 @@ from fclib._words import counted
 
 # of CuPy: without its package there is no type to name
 DeviceArray = Any
+
+INCLUDE: Final = re.compile(r'#include "embed/proximal_small/([\w.]+)"')
 
 FORMS: Final = {"W": 0, "bodies": 1, "few coordinates": 2}
 MOST_CONTACTS: Final = 64  # larger ones are for `auto`, as on the CPU
@@ -132,16 +135,21 @@ def _cupy() -> Any:
 
 
 def sources() -> str:
-    """The kernel with its header, as one text."""
+    """The kernel with its headers, as one text: NVRTC reads no files."""
     here = Path(__file__).resolve().parent
     folder = here / "device"
     if not folder.is_dir():  # a development install
-        folder = here.parents[1] / "core" / "embed"
-    header, kernel = (
-        (folder / f"proximal_small.{suffix}").read_text(encoding="utf-8")
-        for suffix in ("hpp", "cu")
-    )
-    return kernel.replace('#include "proximal_small.hpp"', header.replace("#pragma once", ""))
+        folder = here.parents[1] / "core" / "embed" / "proximal_small"
+    taken: set[str] = set()
+
+    def whole(name: str) -> str:
+        if name in taken:
+            return ""
+        taken.add(name)
+        text = (folder / name).read_text(encoding="utf-8").replace("#pragma once", "")
+        return INCLUDE.sub(lambda found: whole(found[1]), text)
+
+    return whole("kernel.cu")
 
 
 def plan(

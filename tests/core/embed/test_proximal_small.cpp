@@ -1,4 +1,9 @@
-#include "embed/proximal_small.hpp"
+#include "embed/proximal_small/bodies.hpp"
+#include "embed/proximal_small/dense.hpp"
+#include "embed/proximal_small/few_coordinates.hpp"
+#include "embed/proximal_small/groups.hpp"
+#include "embed/proximal_small/law.hpp"
+#include "embed/proximal_small/solver.hpp"
 
 #include <gtest/gtest.h>
 

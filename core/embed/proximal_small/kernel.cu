@@ -1,16 +1,25 @@
-// The kernel of proximal_small.hpp, compiled by NVRTC for the sizes of a batch. Given as macros:
+// The kernel of the method of solver.hpp, compiled by NVRTC for the sizes of a batch. Given as
+// macros:
 //
-//   SPACEDIM, CONTACTS (the most of a problem), FIXED (CONTACTS if all problems have as many, else
-//   0) FORM      0: W; 1: bodies; 2: bodies with few coordinates COPIES    of W: whether it is
-//   given by rows and copied to shared memory; else it is by columns COORDINATES, WIDTH  of bodies:
-//   their number, and how many of them a contact touches at most LANES     of a group: a part of a
-//   warp, or a block of more than 32 threads WARPS     of a block, if LANES is at most 32 WAITING
-//   so many groups of a warp without a problem get new ones together: to read a problem takes
-//             the whole warp about as long as a step
-//   GLOBAL    whether the memory of a group is too large for a multiprocessor's
+//   SPACEDIM
+//   CONTACTS   the most of a problem
+//   FIXED      CONTACTS if all problems have as many, else 0
+//   FORM       0: W; 1: bodies; 2: bodies with few coordinates
+//   COPIES     of W: whether it is given by rows and copied to shared memory; else it is by columns
+//   COORDINATES, WIDTH   of bodies: their number, and how many of them a contact touches at most
+//   LANES      of a group: a part of a warp, or a block of more than 32 threads
+//   WARPS      of a block, if LANES is at most 32
+//   WAITING    so many groups of a warp without a problem get new ones together: to read a problem
+//              takes the whole warp about as long as a step
+//   GLOBAL     whether the memory of a group is too large for a multiprocessor's
 //
 // Groups take one problem after another from a counter, until there are none.
-#include "proximal_small.hpp"
+#include "embed/proximal_small/bodies.hpp"
+#include "embed/proximal_small/dense.hpp"
+#include "embed/proximal_small/few_coordinates.hpp"
+#include "embed/proximal_small/groups.hpp"
+#include "embed/proximal_small/law.hpp"
+#include "embed/proximal_small/solver.hpp"
 
 namespace small = fclib::proximal_small;
 

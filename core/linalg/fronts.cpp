@@ -198,28 +198,33 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
     std::vector<char> merged;
     for (std::size_t k = 0; k < count; ++k) {
       const auto col = static_cast<Index>(k);
+      // the front of the child whose pivots end just before
+      const Index last = k > 0 && parent[k - 1] == col ? front_of[k - 1] : -1;
       std::vector<Index> rows;
       mark[k] = col;
-      const auto node = static_cast<std::size_t>(order[k]);
-      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
-        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
+      if (last >= 0) {  // its rows but the first, which is this column: mostly they are all
+        rows.assign(structure[last].begin() + pivots[last] + 1, structure[last].end());
+        for (const Index row : rows) mark[row] = col;
+      }
+      const std::size_t sorted = rows.size();
+      const auto add = [&](Index row) {
         if (row > col && mark[row] != col) {
           mark[row] = col;
           rows.push_back(row);
         }
+      };
+      const auto node = static_cast<std::size_t>(order[k]);
+      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
+        add(position[pattern.row[static_cast<std::size_t>(e)]]);
       }
       for (const Index child : children[k]) {
-        const std::vector<Index>& below = structure[front_of[child]];
-        for (auto at = static_cast<std::size_t>(pivots[front_of[child]]); at < below.size(); ++at) {
-          if (mark[below[at]] != col) {
-            mark[below[at]] = col;
-            rows.push_back(below[at]);
-          }
-        }
+        const Index front = front_of[child];
+        if (front == last) continue;
+        std::for_each(structure[front].begin() + pivots[front], structure[front].end(), add);
       }
-      std::sort(rows.begin(), rows.end());
-      // merge with the front of the child whose pivots end just before
-      const Index last = k > 0 && parent[k - 1] == col ? front_of[k - 1] : -1;
+      const auto middle = rows.begin() + static_cast<std::ptrdiff_t>(sorted);
+      std::sort(middle, rows.end());
+      std::inplace_merge(rows.begin(), middle, rows.end());
       bool merge = false;
       double empty = 0;
       if (last >= 0) {
@@ -284,31 +289,20 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
       front.runs.back().count += d;
     }
   }
-  for (std::size_t f = 0; f < fronts.size(); ++f) {
-    Front& front = fronts[f];
+  // a front has the entries whose lower index is one of its pivots
+  for (Index col = 0; col < n; ++col) {
+    const auto node = static_cast<std::size_t>(order[col]);
+    for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
+      const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
+      fronts[node_front[std::min(row, col)]].entries.push_back({e, row, col});
+    }
+  }
+  for (Front& front : fronts) {
     for (std::size_t k = 0; k < front.nodes.size(); ++k)
       where[front.nodes[k]] = d * static_cast<Index>(k);
-    for (Index k = 0; k < pivots[f]; ++k) {
-      const Index col = front.nodes[k];
-      const auto node = static_cast<std::size_t>(order[col]);
-      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
-        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
-        // this front has the entries whose lower index is one of its pivots
-        if (node_front[std::min(row, col)] == static_cast<Index>(f)) {
-          front.entries.push_back({e, where[row], where[col]});
-        }
-      }
-    }
-    // ... and those of later columns in the rows of its pivots
-    for (auto k = static_cast<std::size_t>(pivots[f]); k < front.nodes.size(); ++k) {
-      const Index col = front.nodes[k];
-      const auto node = static_cast<std::size_t>(order[col]);
-      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
-        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
-        if (row < col && node_front[row] == static_cast<Index>(f)) {
-          front.entries.push_back({e, where[row], where[col]});
-        }
-      }
+    for (Front::Entry& entry : front.entries) {
+      entry.row = where[entry.row];
+      entry.col = where[entry.col];
     }
   }
 }

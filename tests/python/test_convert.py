@@ -630,3 +630,25 @@ def test_siconos_reads_real_and_rolling_problems_as_they_are(
         for name in VECTORS:
             if getattr(problem, name, None) is not None:
                 np.testing.assert_array_equal(getattr(problem, name), getattr(back, name))
+
+
+def test_joints_of_many_separate_groups_are_eliminated() -> None:
+    """Columns of W' with few rows, with many, and with those that only the joints couple."""
+    random = np.random.default_rng(5)
+    groups = []
+    for size in (1, 1, 2, 30, 1, 1, 2, 1, 1, 1):
+        J = random.standard_normal((3 * size + 4, 3 * size + 2))
+        whole = J.T @ J
+        whole[: 3 * size, : 3 * size] *= np.kron(np.eye(size), np.ones((3, 3)))  # contacts apart
+        groups.append((whole, 3 * size))
+    W = sp.block_diag([whole[:m, :m] for whole, m in groups], format="csr")
+    V = sp.block_diag([whole[:m, m:] for whole, m in groups], format="csr")
+    R = sp.block_diag([whole[m:, m:] for whole, m in groups], format="csr")
+    problem = fclib.LocalProblem(
+        W=W, V=V, R=R, q=random.standard_normal(W.shape[0]), s=random.standard_normal(R.shape[0]),
+        mu=np.full(W.shape[0] // 3, 0.5),
+    )  # fmt: skip
+    left = dense(problem.eliminate().W)
+    expected = dense(W) - dense(V) @ np.linalg.solve(dense(R), dense(V).T)
+    assert np.abs(left - expected).max() <= 1e-11 * np.abs(expected).max()
+    assert ((left != 0) == (expected != 0)).all()

@@ -127,7 +127,7 @@ struct FCLIB_APICOMPILE fclib_matrix {
 
 /** The global problem. M, H, f, w, mu are required. G and b are both there or both NULL. */
 struct FCLIB_APICOMPILE fclib_global {
-  struct fclib_matrix* M; /**< mass matrix, symmetric positive definite (n x n) [kg] */
+  struct fclib_matrix* M; /**< mass matrix, or matrix of an iteration (n x n) [kg] */
   struct fclib_matrix* H; /**< reactions to generalised forces (n x m) [1] */
   struct fclib_matrix* G; /**< bilateral multipliers to generalised forces (n x p) [1] */
   double* mu;             /**< coefficient of friction of each contact (nc) [1] */

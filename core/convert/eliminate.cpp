@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -87,7 +88,6 @@ std::pair<SparseColumns, Vector> difference(const SparseColumns& w, const Sparse
       rows.push_back(static_cast<Index>(row));
     }
   };
-  constexpr std::size_t scan = 8;  // the rows of a column with more than m / 8 are not sorted
   for (Eigen::Index col = 0; col < m; ++col) {
     for (SparseColumns::InnerIterator at(w, col); at; ++at) {
       fill(at.row());
@@ -99,7 +99,8 @@ std::pair<SparseColumns, Vector> difference(const SparseColumns& w, const Sparse
         held[at.row()] += at.value() * factor.value();
       }
     }
-    if (scan * rows.size() > filled.size()) {
+    // to sort them takes some n log2(n) steps for n rows, to look for them m
+    if (rows.size() * static_cast<std::size_t>(std::bit_width(rows.size())) > filled.size()) {
       rows.clear();
       for (Index row = 0; row < static_cast<Index>(m); ++row) {
         if (filled[static_cast<std::size_t>(row)] != 0) rows.push_back(row);

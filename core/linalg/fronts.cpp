@@ -195,7 +195,6 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
     std::vector<Index> front_of(count, -1);  // of the column, if it is the last pivot
     std::vector<Index> mark(count, -1);
     std::vector<double> zeros;
-    std::vector<char> merged;
     for (std::size_t k = 0; k < count; ++k) {
       const auto col = static_cast<Index>(k);
       // the front of the child whose pivots end just before

@@ -652,3 +652,20 @@ def test_joints_of_many_separate_groups_are_eliminated() -> None:
     expected = dense(W) - dense(V) @ np.linalg.solve(dense(R), dense(V).T)
     assert np.abs(left - expected).max() <= 1e-11 * np.abs(expected).max()
     assert ((left != 0) == (expected != 0)).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_contact_that_joints_hold_is_zero_beside_one_that_moves(seed: int) -> None:
+    """The joints are not orthogonal, and leave more than the rounding of its terms."""
+    random = np.random.default_rng(seed)
+    n, p = 12, 6
+    G = random.standard_normal((n, p)) @ np.vander(np.linspace(-1, 1, p))
+    H = np.hstack([G @ random.standard_normal((p, 3)), random.standard_normal((n, 3))])
+    problem = fclib.LocalProblem(
+        W=H.T @ H, V=H.T @ G, R=G.T @ G, q=np.full(6, -1.0), s=np.zeros(p), mu=[0.5, 0.5]
+    )
+    left = dense(problem.eliminate().W)
+    assert not left[:3].any()
+    assert not left[:, :3].any()
+    free = np.eye(n) - G @ np.linalg.pinv(G)
+    np.testing.assert_allclose(left[3:, 3:], H[:, 3:].T @ free @ H[:, 3:], rtol=1e-6)

@@ -2,9 +2,10 @@
 //
 // A system has the memory that the lanes of a group share. It offers
 //
-//   take      reads a problem: whether all entries are finite, q and the mean |W_kk| of each
-//   contact product   y = W x of the lane's contacts put       F and D of a contact solve     the
-//   Newton step dp of the lane's contacts, after `put` of all
+//   take      reads a problem: whether all entries are finite, q, and the mean |W_kk| of a contact
+//   product   y = W x of the lane's contacts
+//   put       F and D of a contact
+//   solve     the Newton step dp of the lane's contacts, after `put` of all
 //
 // The contacts of a lane are lane, lane + size, ...
 #pragma once
